@@ -1,0 +1,48 @@
+// Scene + settings -> image. The whole engine behind one function.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "lumigrove/image.h"
+#include "lumigrove/scene.h"
+#include "lumigrove/settings.h"
+
+namespace lumigrove {
+
+struct PassStats {
+  std::string name;
+  double ms = 0;            // wall time summed over all camera samples
+  std::uint64_t rays = 0;   // traced in this pass
+};
+struct StructureStats {
+  std::string name;         // "embree", "light set", "perfect tree", "alias table"
+  double build_ms = 0;
+  std::uint64_t bytes = 0;
+  std::uint64_t elements = 0;
+};
+struct RenderStats {
+  int spp_done = 0;         // below settings.spp when cancelled
+  double total_ms = 0;
+  std::uint64_t emitters = 0;
+  std::vector<PassStats> passes;
+  std::vector<StructureStats> structures;
+};
+
+struct Progress {
+  int spp_done = 0, spp_total = 0;
+  double elapsed_s = 0;
+};
+// Called after every camera sample; return false to stop early with a valid image.
+using ProgressFunction = std::function<bool(const Progress&)>;
+
+// Layers: beauty RGBA; direct, indirect, emission, albedo (RGB); N, P (XYZ); Z; variance (RGB, of the pixel mean,
+// when spp >= 2); emitter and instance ids of the first hit. Throws Error. Deterministic for any thread count.
+Image render(const Scene& scene, const Settings& settings, RenderStats* stats = nullptr,
+             const ProgressFunction& progress = {});
+
+const char* version();
+
+}  // namespace lumigrove

@@ -1,0 +1,83 @@
+// What a render is asked for. Every field has a dotted key ("direct.spp") in the table of src/frame/registry.cpp,
+// which is what --set, --settings FILE.toml, `lumigrove list settings` and receipts go through.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "lumigrove/error.h"
+#include "lumigrove/vec.h"
+
+namespace lumigrove {
+
+// The axes of the space of methods (docs/papers.md); the table in registry.cpp holds their names.
+enum class Hierarchy : std::uint8_t { kNone, kPerfect };
+enum class Weights : std::uint8_t { kMinMax };
+enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll };
+enum class Transport : std::uint8_t { kNone, kPath };
+
+// Light that reaches a surface straight from an emitter.
+struct DirectSettings {
+  Selection selection = Selection::kRoot;
+  Hierarchy hierarchy = Hierarchy::kPerfect;  // needed by kRoot
+  Weights weights = Weights::kMinMax;
+  int width = 8;                // children a node: 2 (as the paper), 4, 8, 16
+  int spp = 1;                  // light samples for each camera sample
+  bool mis = false;             // combine with BSDF sampling (balance heuristic)
+};
+
+// Light that reaches a surface from other surfaces.
+struct IndirectSettings {
+  Transport transport = Transport::kNone;
+  int max_bounces = 4;          // indirect bounces; 0 = none
+  int roulette_start = 3;       // first bounce that Russian roulette may end
+};
+
+struct ViewSettings {           // replaces the scene's camera when set (Embree's names)
+  vec3 position = vec3(0), look_at = vec3(0, 0, -1), up = vec3(0, 1, 0);
+};
+
+struct Settings {
+  std::string preset = "tree";  // the row these settings started from
+  int width = 1280, height = 720;
+  std::optional<std::array<int, 4>> pixel_bounds;  // x0,x1,y0,y1 half-open, as pbrt; others stay black
+  int spp = 1;                  // camera samples a pixel
+  std::uint32_t seed = 0;
+  int frame = 0;                // second key of the random numbers; animation frame number
+  double time = 0;              // seconds
+  int threads = 0;              // 0 = all cores
+  std::string camera;           // name, empty = the scene's first
+  std::optional<ViewSettings> view;
+  std::optional<float> fov;     // vertical, degrees
+  float light_scale = 1;        // multiplies every emitter
+  bool force_diffuse = false;   // drop every specular lobe
+  bool ignore_range = false;    // punctual lights reach infinitely far
+  bool jitter = true;           // uniform position inside the pixel; otherwise its centre
+  DirectSettings direct;
+  IndirectSettings indirect;
+};
+
+struct PresetInfo {
+  std::string name, description, citation;
+  std::vector<std::pair<std::string, std::string>> values;  // key, value applied over the defaults
+};
+struct SettingInfo {
+  std::string key, type, default_value, unit, description;
+  std::vector<std::string> choices;  // of an enumeration
+};
+const std::vector<PresetInfo>& presets();
+const std::vector<SettingInfo>& settings_table();
+
+// Throws Error that names the nearest valid key or the valid values.
+void set_value(Settings& settings, const std::string& key, const std::string& value);
+std::string get_value(const Settings& settings, const std::string& key);
+Settings make_preset(const std::string& name);
+
+// Throws Error for combinations that make no sense, in one sentence.
+void check(const Settings& settings);
+
+}  // namespace lumigrove

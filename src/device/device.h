@@ -1,0 +1,28 @@
+// The executor: runs a kernel struct once for every index. Work is split over oneTBB; what a kernel writes must
+// depend on its index only, so that any thread count gives the same bits.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <cstddef>
+
+namespace lumigrove {
+
+// Indices of one task; small enough to balance, large enough to hide the scheduler.
+inline constexpr int kLaunchGrain = 256;
+
+// kernel(i) for i in [0, count).
+template <class Kernel>
+void launch(int count, const Kernel& kernel, int grain = kLaunchGrain) {
+  if (count <= grain) {
+    for (int i = 0; i < count; ++i) kernel(i);
+    return;
+  }
+  tbb::parallel_for(tbb::blocked_range<int>(0, count, static_cast<std::size_t>(grain)),
+                    [&](const tbb::blocked_range<int>& range) {
+                      for (int i = range.begin(); i != range.end(); ++i) kernel(i);
+                    });
+}
+
+}  // namespace lumigrove
