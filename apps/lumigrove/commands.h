@@ -1,0 +1,17 @@
+// Subcommands of the tool, one file each. add_X_command registers the options and a callback that does the
+// work; main() parses, and translates what a callback throws:
+//   lumigrove::Error  one sentence on stderr, exit status 1
+//   ExitCode          the status as it is; whatever had to be said is already printed
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace lumigrove {
+
+struct ExitCode {
+  int status = 0;
+};
+
+void add_compare_command(CLI::App& app);  // compare.cpp
+
+}  // namespace lumigrove
