@@ -68,6 +68,7 @@ struct PresetInfo {
 struct SettingInfo {
   std::string key, type, default_value, unit, description;
   std::vector<std::string> choices;  // of an enumeration
+  std::string range;                 // of a number, in words: "from 1 to 65536"
 };
 const std::vector<PresetInfo>& presets();
 const std::vector<SettingInfo>& settings_table();

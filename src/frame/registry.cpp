@@ -1,0 +1,392 @@
+// The two visible tables of the program: what can be set, and which sets of values have a name.
+// Nothing else in the program knows a preset's name.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+
+#include "base/nearest.h"
+#include "frame/value_text.h"
+#include "lumigrove/settings.h"
+
+namespace lumigrove {
+namespace {
+
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr double kLargestInt = std::numeric_limits<int>::max();
+constexpr int kLargestSide = 65536;              // pixels
+constexpr std::int64_t kLargestImage = 1 << 28;  // pixels; every layer needs 4 to 16 bytes for each
+constexpr const char* kUnset = "none";           // text of an optional setting without value
+
+// One row: what is told about a setting, and how it is read and written.
+struct Setting {
+  SettingInfo info;
+  std::function<std::string(const Settings&)> get;
+  std::function<void(Settings&, const std::string&)> set;
+};
+
+// Each row builder below takes `member`, a generic lambda from (const) Settings& to a reference of the field.
+
+template <class Member>
+Setting integer(const std::string& key, Member member, Range range, const std::string& unit,
+                const std::string& description) {
+  return {{key, "int", "", unit, description, {}, describe(range)},
+          [=](const Settings& s) { return std::to_string(member(s)); },
+          [=](Settings& s, const std::string& text) {
+            member(s) = static_cast<std::decay_t<decltype(member(s))>>(parse_integer(key, text, range));
+          }};
+}
+
+template <class Member>
+Setting real(const std::string& key, Member member, Range range, const std::string& unit,
+             const std::string& description) {
+  return {{key, "float", "", unit, description, {}, describe(range)},
+          [=](const Settings& s) { return print(member(s)); },
+          [=](Settings& s, const std::string& text) {
+            if constexpr (std::is_same_v<std::decay_t<decltype(member(s))>, float>)
+              member(s) = parse_float(key, text, range);
+            else
+              member(s) = parse_double(key, text, range);
+          }};
+}
+
+template <class Member>
+Setting flag(const std::string& key, Member member, const std::string& description) {
+  return {{key, "bool", "", "", description, {"true", "false"}, ""},
+          [=](const Settings& s) { return print(member(s)); },
+          [=](Settings& s, const std::string& text) { member(s) = parse_bool(key, text); }};
+}
+
+template <class Member>
+Setting text(const std::string& key, Member member, const std::string& description) {
+  return {{key, "text", "", "", description, {}, ""},
+          [=](const Settings& s) { return member(s); },
+          [=](Settings& s, const std::string& value) { member(s) = value; }};
+}
+
+// An enumeration (or a small set of numbers): `names` and `values` in the same order.
+template <class Member, class Value>
+Setting choice(const std::string& key, Member member,
+               const std::vector<std::pair<std::string, Value>>& values, const std::string& description) {
+  SettingInfo info{key, "choice", "", "", description, {}, ""};
+  for (const auto& [name, value] : values) info.choices.push_back(name);
+  return {info,
+          [=](const Settings& s) {
+            for (const auto& [name, value] : values)
+              if (value == member(s)) return name;
+            return fmt::format("#{}", static_cast<int>(member(s)));  // not a valid value: `check` refuses it
+          },
+          [=, names = info.choices](Settings& s, const std::string& text) {
+            const auto found = std::find(names.begin(), names.end(), text);
+            if (found == names.end())
+              refuse_value(key, text, fmt::format("one of {}", fmt::join(names, ", ")));
+            member(s) = values[static_cast<std::size_t>(found - names.begin())].second;
+          }};
+}
+
+// Part of Settings::view: giving one of its vectors creates the view, "none" removes the view.
+template <class Member>
+Setting view_vector(const std::string& key, Member member, const std::string& unit,
+                    const std::string& description) {
+  return {{key, "vec3", "", unit, description, {}, "three numbers 'x,y,z', or none"},
+          [=](const Settings& s) { return s.view ? print(member(*s.view)) : std::string(kUnset); },
+          [=](Settings& s, const std::string& value) {
+            if (value == kUnset) {
+              s.view.reset();
+              return;
+            }
+            const vec3 parsed = parse_vec3(key, value);
+            if (!s.view) s.view.emplace();
+            member(*s.view) = parsed;
+          }};
+}
+
+Setting preset_row() {
+  std::vector<std::string> names;
+  for (const PresetInfo& preset : presets()) names.push_back(preset.name);
+  return {
+      {"preset", "choice", "", "", "Method: sets direct.* and indirect.* as `list methods` shows", names, ""},
+      [](const Settings& s) { return s.preset; },
+      [](Settings& s, const std::string& value) {
+        const Settings row = make_preset(value);
+        s.preset = row.preset;
+        s.direct = row.direct;
+        s.indirect = row.indirect;
+      }};
+}
+
+Setting pixel_bounds_row() {
+  const std::string key = "pixel_bounds";
+  return {{key,
+           "int4",
+           "",
+           "pixels",
+           "Render only x0 <= x < x1, y0 <= y < y1; other pixels stay black",
+           {},
+           "four whole numbers 'x0,x1,y0,y1', or none"},
+          [](const Settings& s) { return s.pixel_bounds ? print(*s.pixel_bounds) : std::string(kUnset); },
+          [=](Settings& s, const std::string& value) {
+            if (value == kUnset)
+              s.pixel_bounds.reset();
+            else
+              s.pixel_bounds = parse_int4(key, value);
+          }};
+}
+
+Setting fov_row() {
+  const std::string key = "fov";
+  const Range range{0, 180, true};
+  return {{key,
+           "float",
+           "",
+           "degrees",
+           "Vertical field of view; none = the camera's own",
+           {},
+           describe(range) + ", or none"},
+          [](const Settings& s) { return s.fov ? print(*s.fov) : std::string(kUnset); },
+          [=](Settings& s, const std::string& value) {
+            if (value == kUnset)
+              s.fov.reset();
+            else
+              s.fov = parse_float(key, value, range);
+          }};
+}
+
+std::vector<Setting> image_rows() {
+  const Range side{1, kLargestSide};
+  return {
+      integer(
+          "width", [](auto& s) -> auto& { return s.width; }, side, "pixels", "Image width"),
+      integer(
+          "height", [](auto& s) -> auto& { return s.height; }, side, "pixels", "Image height"),
+      pixel_bounds_row(),
+      integer(
+          "spp", [](auto& s) -> auto& { return s.spp; }, {1, 1 << 24}, "samples", "Camera samples a pixel"),
+      integer(
+          "seed", [](auto& s) -> auto& { return s.seed; }, {0, 4294967295.0}, "",
+          "First key of the random numbers"),
+      integer(
+          "frame", [](auto& s) -> auto& { return s.frame; }, {0, kLargestInt}, "",
+          "Frame number, second key of the random numbers"),
+      real(
+          "time", [](auto& s) -> auto& { return s.time; }, {-kNoLimit, kNoLimit}, "s",
+          "Moment of the animation; beyond its ends the first or last pose holds"),
+      integer(
+          "threads", [](auto& s) -> auto& { return s.threads; }, {0, 1024}, "",
+          "Worker threads, 0 = all cores; the image does not depend on it"),
+      flag(
+          "jitter", [](auto& s) -> auto& { return s.jitter; },
+          "Camera samples are spread over the pixel; otherwise all go through its centre"),
+  };
+}
+
+std::vector<Setting> scene_rows() {
+  return {
+      text(
+          "camera", [](auto& s) -> auto& { return s.camera; },
+          "Camera by name; empty = the scene's first, or a view of the whole scene when it has none"),
+      view_vector(
+          "view.position", [](auto& v) -> auto& { return v.position; }, "m",
+          "Eye; a view replaces the scene's camera"),
+      view_vector(
+          "view.look_at", [](auto& v) -> auto& { return v.look_at; }, "m",
+          "Point in the centre of the image"),
+      view_vector(
+          "view.up", [](auto& v) -> auto& { return v.up; }, "", "Direction that is up in the image"),
+      fov_row(),
+      real(
+          "light_scale", [](auto& s) -> auto& { return s.light_scale; }, {0, kNoLimit}, "",
+          "Multiplies the radiance of every emitter"),
+      flag(
+          "force_diffuse", [](auto& s) -> auto& { return s.force_diffuse; }, "Drop every specular lobe"),
+      flag(
+          "ignore_range", [](auto& s) -> auto& { return s.ignore_range; },
+          "Point and spot lights reach infinitely far"),
+  };
+}
+
+std::vector<Setting> direct_rows() {
+  using std::pair;
+  using std::string;
+  using std::vector;
+  return {
+      choice(
+          "direct.selection", [](auto& s) -> auto& { return s.direct.selection; },
+          vector<pair<string, Selection>>{{"uniform", Selection::kUniform},
+                                          {"power", Selection::kPower},
+                                          {"root", Selection::kRoot},
+                                          {"all", Selection::kAll}},
+          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, or all of "
+          "them"),
+      choice(
+          "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
+          vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone}, {"perfect", Hierarchy::kPerfect}},
+          "Hierarchy over the emitters"),
+      choice(
+          "direct.weights", [](auto& s) -> auto& { return s.direct.weights; },
+          vector<pair<string, Weights>>{{"min-max", Weights::kMinMax}},
+          "Weights of a node's children: mean of those at least and at greatest distance"),
+      choice(
+          "direct.width", [](auto& s) -> auto& { return s.direct.width; },
+          vector<pair<string, int>>{{"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}},
+          "Children of a hierarchy node"),
+      integer(
+          "direct.spp", [](auto& s) -> auto& { return s.direct.spp; }, {1, 4096}, "samples",
+          "Light samples for each camera sample"),
+      flag(
+          "direct.mis", [](auto& s) -> auto& { return s.direct.mis; },
+          "Combine light samples with BSDF samples (balance heuristic)"),
+  };
+}
+
+std::vector<Setting> indirect_rows() {
+  using Names = std::vector<std::pair<std::string, Transport>>;
+  return {
+      choice(
+          "indirect.transport", [](auto& s) -> auto& { return s.indirect.transport; },
+          Names{{"none", Transport::kNone}, {"path", Transport::kPath}},
+          "How light from other surfaces is found"),
+      integer(
+          "indirect.max_bounces", [](auto& s) -> auto& { return s.indirect.max_bounces; }, {0, 1024},
+          "bounces", "Most indirect bounces of a path, 0 = direct light only"),
+      integer(
+          "indirect.roulette_start", [](auto& s) -> auto& { return s.indirect.roulette_start; }, {0, 1024},
+          "bounces", "First bounce that Russian roulette may end"),
+  };
+}
+
+const std::vector<Setting>& settings() {
+  static const std::vector<Setting> rows = [] {
+    std::vector<Setting> all{preset_row()};
+    for (const auto& group : {image_rows(), scene_rows(), direct_rows(), indirect_rows()})
+      all.insert(all.end(), group.begin(), group.end());
+    for (Setting& row : all) row.info.default_value = row.get(Settings{});
+    return all;
+  }();
+  return rows;
+}
+
+const Setting& find_setting(const std::string& key) {
+  std::vector<std::string> keys;
+  for (const Setting& row : settings()) {
+    if (row.info.key == key) return row;
+    keys.push_back(row.info.key);
+  }
+  throw Error(
+      fmt::format("unknown setting '{}'; the nearest one is '{}' (`lumigrove list settings` shows all)", key,
+                  nearest(key, keys)));
+}
+
+// Fields may have been written without set_value: reading each back through its row checks its range.
+void check_ranges(const Settings& settings_to_check) {
+  Settings copy = settings_to_check;
+  for (const Setting& row : settings())
+    if (row.info.key != "preset") row.set(copy, row.get(settings_to_check));
+}
+
+void check_image(const Settings& s) {
+  if (static_cast<std::int64_t>(s.width) * s.height > kLargestImage)
+    throw Error(fmt::format("an image of {}x{} pixels is too large; at most {} pixels are possible", s.width,
+                            s.height, kLargestImage));
+  if (!s.pixel_bounds) return;
+  const auto [x0, x1, y0, y1] = *s.pixel_bounds;
+  if (x0 < 0 || x1 > s.width || y0 < 0 || y1 > s.height || x0 >= x1 || y0 >= y1)
+    throw Error(
+        fmt::format("pixel_bounds {},{},{},{} (x0,x1,y0,y1) is empty or leaves the image of {}x{} pixels", x0,
+                    x1, y0, y1, s.width, s.height));
+}
+
+void check_view(const ViewSettings& view) {
+  const vec3 forward = view.look_at - view.position;
+  if (!(glm::length(forward) > 0)) throw Error("view.position and view.look_at are the same point");
+  if (!(glm::length(view.up) > 0)) throw Error("view.up has no direction");
+  const float sine = glm::length(glm::cross(glm::normalize(forward), glm::normalize(view.up)));
+  constexpr float kLeastSine = 1e-4f;
+  if (!(sine > kLeastSine)) throw Error("view.up is parallel to the viewing direction");
+}
+
+}  // namespace
+
+const std::vector<PresetInfo>& presets() {
+  static const std::vector<PresetInfo> table = {
+      {"tree",
+       "Perfect light tree walked from its root with min/max-distance weights; direct light only",
+       "D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts. Proc. ACM Comput. Graph. Interact. Tech. 3(1), "
+       "2020, "
+       "sections 3.1 and 3.2",
+       {{"direct.selection", "root"},
+        {"direct.hierarchy", "perfect"},
+        {"direct.weights", "min-max"},
+        {"indirect.transport", "none"}}},
+      {"power",
+       "Emitters by flux, from an alias table; direct light only",
+       "A. J. Walker: An Efficient Method for Generating Discrete Random Variables with General "
+       "Distributions. "
+       "ACM Trans. Math. Softw. 3(3), 1977",
+       {{"direct.selection", "power"}, {"direct.hierarchy", "none"}, {"indirect.transport", "none"}}},
+      {"uniform",
+       "Every emitter equally likely; direct light only",
+       "P. Shirley, C. Wang, K. Zimmerman: Monte Carlo Techniques for Direct Lighting Calculations. "
+       "ACM Trans. Graph. 15(1), 1996",
+       {{"direct.selection", "uniform"}, {"direct.hierarchy", "none"}, {"indirect.transport", "none"}}},
+      {"exhaustive",
+       "A sample of every emitter at every point: the oracle of light selection; direct light only",
+       "P. Shirley, C. Wang, K. Zimmerman: Monte Carlo Techniques for Direct Lighting Calculations. "
+       "ACM Trans. Graph. 15(1), 1996",
+       {{"direct.selection", "all"}, {"direct.hierarchy", "none"}, {"indirect.transport", "none"}}},
+      {"path",
+       "Path tracer, the reference: light samples by the tree, BSDF samples, MIS, Russian roulette",
+       "J. T. Kajiya: The Rendering Equation. SIGGRAPH 1986; E. Veach, L. J. Guibas: Optimally Combining "
+       "Sampling "
+       "Techniques for Monte Carlo Rendering. SIGGRAPH 1995",
+       {{"direct.selection", "root"},
+        {"direct.hierarchy", "perfect"},
+        {"direct.mis", "true"},
+        {"indirect.transport", "path"},
+        {"indirect.max_bounces", "8"}}},
+  };
+  return table;
+}
+
+const std::vector<SettingInfo>& settings_table() {
+  static const std::vector<SettingInfo> table = [] {
+    std::vector<SettingInfo> infos;
+    for (const Setting& row : settings()) infos.push_back(row.info);
+    return infos;
+  }();
+  return table;
+}
+
+void set_value(Settings& settings_to_change, const std::string& key, const std::string& value) {
+  find_setting(key).set(settings_to_change, value);
+}
+
+std::string get_value(const Settings& settings_to_read, const std::string& key) {
+  return find_setting(key).get(settings_to_read);
+}
+
+Settings make_preset(const std::string& name) {
+  std::vector<std::string> names;
+  for (const PresetInfo& preset : presets()) {
+    names.push_back(preset.name);
+    if (preset.name != name) continue;
+    Settings result;
+    result.preset = name;
+    for (const auto& [key, value] : preset.values) set_value(result, key, value);
+    return result;
+  }
+  throw Error(fmt::format("unknown method '{}'; the nearest one is '{}', all are {}", name,
+                          nearest(name, names), fmt::join(names, ", ")));
+}
+
+void check(const Settings& s) {
+  check_ranges(s);
+  check_image(s);
+  if (s.view) check_view(*s.view);
+  if (s.direct.selection == Selection::kRoot && s.direct.hierarchy == Hierarchy::kNone)
+    throw Error("direct.selection 'root' walks a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
+}
+
+}  // namespace lumigrove
