@@ -1,0 +1,20 @@
+// The sRGB transfer curve (IEC 61966-2-1).
+#pragma once
+
+#include <cmath>
+
+#include "base/vec.h"
+
+namespace lumigrove {
+
+// Encoded [0,1] -> linear [0,1].
+LUMI_HD inline float srgb_to_linear(float encoded) {
+  return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
+}
+
+// Linear [0,1] -> encoded [0,1].
+LUMI_HD inline float linear_to_srgb(float linear) {
+  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
+}
+
+}  // namespace lumigrove
