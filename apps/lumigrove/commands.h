@@ -12,6 +12,10 @@ struct ExitCode {
   int status = 0;
 };
 
+void add_render_command(CLI::App& app);   // render.cpp
+void add_scene_command(CLI::App& app);    // scene.cpp
+void add_list_command(CLI::App& app);     // list.cpp
+void add_rerun_command(CLI::App& app);    // rerun.cpp
 void add_compare_command(CLI::App& app);  // compare.cpp
 
 }  // namespace lumigrove

@@ -17,8 +17,11 @@ struct PassStats {
   double ms = 0;            // wall time summed over all camera samples
   std::uint64_t rays = 0;   // traced in this pass
 };
+// Name of the structure that serves geometry; all others serve lights and count towards the bytes per light.
+inline constexpr const char* kAccelerationStructure = "acceleration structure";
+
 struct StructureStats {
-  std::string name;         // "embree", "light set", "perfect tree", "alias table"
+  std::string name;         // kAccelerationStructure, "light set", "perfect tree", "alias table"
   double build_ms = 0;
   std::uint64_t bytes = 0;
   std::uint64_t elements = 0;
@@ -43,6 +46,7 @@ using ProgressFunction = std::function<bool(const Progress&)>;
 Image render(const Scene& scene, const Settings& settings, RenderStats* stats = nullptr,
              const ProgressFunction& progress = {});
 
-const char* version();
+const char* version();  // "0.1.0"
+const char* commit();   // of the source tree, "-dirty" when changed; empty when built outside a repository
 
 }  // namespace lumigrove

@@ -1,4 +1,9 @@
+#include LUMIGROVE_COMMIT_HEADER  // written by cmake/write_commit.cmake
+#include "lumigrove/renderer.h"
+
 namespace lumigrove {
-const char* version();
-const char* version() { return "0.1.0"; }
+
+const char* version() { return LUMIGROVE_VERSION; }
+const char* commit() { return LUMIGROVE_COMMIT; }
+
 }  // namespace lumigrove

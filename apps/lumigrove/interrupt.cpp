@@ -1,0 +1,33 @@
+#include "interrupt.h"
+
+#include <atomic>
+#include <csignal>
+
+namespace lumigrove {
+namespace {
+
+std::atomic<int> received_signal{0};
+static_assert(std::atomic<int>::is_always_lock_free, "a signal handler may touch nothing else");
+
+void remember(int signal_number) {
+  received_signal = signal_number;
+  std::signal(signal_number, SIG_DFL);
+}
+
+}  // namespace
+
+InterruptGuard::InterruptGuard() {
+  received_signal = 0;
+  old_interrupt_ = std::signal(SIGINT, remember);
+  old_terminate_ = std::signal(SIGTERM, remember);
+}
+
+InterruptGuard::~InterruptGuard() {
+  std::signal(SIGINT, old_interrupt_);
+  std::signal(SIGTERM, old_terminate_);
+}
+
+bool InterruptGuard::interrupted() const { return received_signal != 0; }
+int InterruptGuard::exit_status() const { return 128 + received_signal; }
+
+}  // namespace lumigrove
