@@ -1,0 +1,596 @@
+// `night-city`: streets at night lit by nothing but tens of thousands of local lights: windows, shop fronts,
+// street lamps, neon lettering, swinging strings of bulbs, drifting lanterns and traffic. The budget `lights`
+// is shared out over the kinds; windows take what the others leave, so that the total comes near it.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "scene/builtin/building.h"
+#include "scene/builtin/builtin.h"
+#include "scene/builtin/neon.h"
+#include "scene/builtin/noise.h"
+#include "scene/builtin/random_stream.h"
+#include "scene/builtin/scene_parts.h"
+
+namespace lumigrove::builtin {
+namespace {
+
+constexpr float kLot = 56, kStreet = 16, kPitch = kLot + kStreet;  // metres
+constexpr float kHalfRoad = 5.2f, kCurb = 0.15f;
+constexpr float kPeriod = 8;  // seconds
+constexpr float kBulbShare = 0.33f, kNeonShare = 0.22f, kLampShare = 0.04f;
+constexpr std::size_t kMostLamps = 3000;
+enum Purpose : std::uint32_t { kPlan, kWindowColor, kBulb, kSign, kTraffic, kLantern, kStains };
+
+// The grid of streets. Street k runs along x or z at line(k); the middle one along z is where the camera
+// stands.
+struct Plan {
+  int blocks;
+  std::uint32_t seed;
+  float line(int k) const { return kPitch * static_cast<float>(k - blocks / 2); }
+  int streets() const { return blocks + 1; }
+  float lo() const { return line(0); }
+  float hi() const { return line(blocks); }
+  float camera_z() const { return std::min(96.0f, hi() - 12); }
+};
+
+struct City {
+  Scene scene;
+  Plan plan;
+  std::vector<WindowSlot> windows;
+  std::vector<Facade> facades;
+  std::size_t emissive = 0;  // triangles placed so far
+};
+
+// --- ground
+// ---------------------------------------------------------------------------------------------------
+
+// Wet asphalt: roughness falls in puddles, where the colour darkens too. Tiles without a seam.
+struct Asphalt {
+  int color_image, roughness_image;
+};
+Asphalt add_asphalt_images(Scene& scene, std::uint32_t seed) {
+  constexpr int kSize = 512;
+  Image8or32 color, rough;
+  color.name = "asphalt";
+  rough.name = "asphalt roughness";
+  color.width = color.height = rough.width = rough.height = kSize;
+  color.srgb = true;
+  const auto tiled = [&](vec2 p, float scale,
+                         std::uint32_t key) {  // four shifted copies blended to wrap around
+    const auto at = [&](float dx, float dy) {
+      return fractal_noise((p + vec2(dx, dy)) * scale + 300.0f, 4, key);
+    };
+    const vec2 w = p;
+    return glm::mix(glm::mix(at(0, 0), at(-1, 0), w.x), glm::mix(at(0, -1), at(-1, -1), w.x), w.y);
+  };
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x) {
+      const vec2 p = (vec2(x, y) + 0.5f) / static_cast<float>(kSize);
+      const float puddle = glm::smoothstep(0.48f, 0.56f, tiled(p, 7, seed ^ 0x77u));
+      const float grain = tiled(p, 90, seed ^ 0x1234u);
+      const float shade = glm::mix(0.44f + 0.16f * grain, 0.33f + 0.05f * grain, puddle);
+      const float roughness = glm::mix(0.62f + 0.2f * grain, 0.34f, puddle);
+      const auto byte = [](float v) {
+        return static_cast<std::uint8_t>(std::lround(255 * glm::clamp(v, 0.0f, 1.0f)));
+      };
+      color.texels8.insert(color.texels8.end(), {byte(shade), byte(shade), byte(1.04f * shade), 255});
+      rough.texels8.insert(rough.texels8.end(), {255, byte(roughness), 0, 255});
+    }
+  scene.images.push_back(std::move(color));
+  scene.images.push_back(std::move(rough));
+  const int last = static_cast<int>(scene.images.size()) - 1;
+  return {last - 1, last};
+}
+
+void add_ground(City& city) {
+  Scene& scene = city.scene;
+  const Asphalt images = add_asphalt_images(scene, city.plan.seed);
+  const int asphalt = add_surface(scene, "wet asphalt", vec3(1));
+  for (TextureUse* use :
+       {&scene.materials[asphalt].base_color_texture, &scene.materials[asphalt].metallic_roughness_texture})
+    use->scale = vec2(1.0f / 14);  // one tile is 14 m wide
+  scene.materials[asphalt].base_color_texture.image = images.color_image;
+  scene.materials[asphalt].metallic_roughness_texture.image = images.roughness_image;
+  MeshBuilder builder;
+  const float edge = city.plan.hi() + 60;
+  builder.quad(vec3(-edge, 0, edge), vec3(2 * edge, 0, 0), vec3(0, 0, -2 * edge));
+  add_static(scene, builder, "road", asphalt);
+
+  for (int i = 0; i < city.plan.blocks; ++i)
+    for (int j = 0; j < city.plan.blocks; ++j)
+      builder.box(vec3(city.plan.line(i) + kHalfRoad, 0, city.plan.line(j) + kHalfRoad),
+                  vec3(city.plan.line(i + 1) - kHalfRoad, kCurb, city.plan.line(j + 1) - kHalfRoad),
+                  kSides | kTop);
+  add_static(scene, builder, "pavement", add_surface(scene, "pavement", vec3(0.34f, 0.33f, 0.31f), 0.7f));
+}
+
+// Dashes along the middle of every street and zebra crossings, a centimetre above the road.
+void add_markings(City& city) {
+  MeshBuilder builder;
+  const auto rectangle = [&](bool along_x, float line, float at, float length, float across, float width) {
+    const vec3 corner = along_x ? vec3(at, 0.01f, line + across + width / 2)
+                                : vec3(line + across - width / 2, 0.01f, at + length);
+    builder.quad(corner, along_x ? vec3(length, 0, 0) : vec3(width, 0, 0),
+                 along_x ? vec3(0, 0, -width) : vec3(0, 0, -length));
+  };
+  for (const bool along_x : {false, true})
+    for (int k = 0; k < city.plan.streets(); ++k)
+      for (int b = 0; b < city.plan.blocks; ++b) {
+        const float line = city.plan.line(k), from = city.plan.line(b) + 11, to = city.plan.line(b + 1) - 11;
+        for (float at = from; at + 2 <= to; at += 5) rectangle(along_x, line, at, 2, 0, 0.14f);
+        for (const float at : {from - 4.5f, to + 2.0f})
+          for (float across = -4.2f; across < 4.5f; across += 1.2f)
+            rectangle(along_x, line, at, 2.5f, across, 0.5f);
+      }
+  add_static(city.scene, builder, "road markings",
+             add_surface(city.scene, "road paint", vec3(0.62f, 0.62f, 0.58f), 0.5f));
+}
+
+// --- buildings
+// ------------------------------------------------------------------------------------------------
+
+constexpr std::array<vec3, 5> kWallColors = {vec3(0.46f, 0.30f, 0.23f), vec3(0.55f, 0.52f, 0.47f),
+                                             vec3(0.36f, 0.36f, 0.38f), vec3(0.60f, 0.50f, 0.38f),
+                                             vec3(0.42f, 0.45f, 0.50f)};
+using WallBuilders = std::array<MeshBuilder, kWallColors.size()>;
+
+void add_rooftop(const BuildingShape& shape, RandomStream& random, MeshBuilder& walls) {
+  const float top = shape.height() - 0.4f;
+  for (int k = 0; k < 3; ++k) {
+    const vec2 size(random.uniform(1.5f, 5), random.uniform(1.5f, 5));
+    const vec2 at =
+        shape.lo + 1.0f + (shape.hi - shape.lo - size - 2.0f) * vec2(random.uniform(), random.uniform());
+    walls.box(vec3(at.x, top, at.y), vec3(at.x + size.x, top + random.uniform(1, 3.2f), at.y + size.y),
+              kSides | kTop);
+  }
+}
+
+void add_block(City& city, int i, int j, WallBuilders& walls) {
+  RandomStream random(city.plan.seed, kPlan, static_cast<std::uint32_t>(i * 64 + j));
+  const vec2 lo(city.plan.line(i) + kStreet / 2, city.plan.line(j) + kStreet / 2);
+  const int nx = 2 + random.integer(2), nz = 2 + random.integer(2);
+  const vec2 lot = vec2(kLot) / vec2(nx, nz);
+  for (int a = 0; a < nx; ++a)
+    for (int b = 0; b < nz; ++b) {
+      BuildingShape shape;
+      const vec2 gap(a + 1 < nx ? 1.5f : 0.0f, b + 1 < nz ? 1.5f : 0.0f);  // alleys inside the block
+      shape.lo = lo + lot * vec2(a, b);
+      shape.hi = shape.lo + lot - gap;
+      shape.base = kCurb;
+      shape.floors = 3 + random.integer(6) + (random.chance(0.22f) ? 5 + random.integer(8) : 0);
+      shape.floor_height = random.uniform(3.1f, 3.7f);
+      shape.bay = random.uniform(2.9f, 4.2f);
+      shape.pilasters = random.chance(0.6f);
+      shape.bands = !shape.pilasters || random.chance(0.5f);
+      shape.weight = random.uniform(0.4f, 1.6f);
+      MeshBuilder& builder = walls[static_cast<std::size_t>(random.integer(static_cast<int>(walls.size())))];
+      add_building(shape, builder, city.windows, city.facades);
+      add_rooftop(shape, random, builder);
+    }
+}
+
+// A tower at the far end closes the view along the main street.
+void add_landmark(City& city, MeshBuilder& walls) {
+  BuildingShape shape;
+  const float x = city.plan.line(city.plan.blocks / 2), z = city.plan.lo() - kStreet / 2;
+  shape.lo = vec2(x - 17, z - 30);
+  shape.hi = vec2(x + 17, z);
+  shape.floors = 24;
+  shape.weight = 2;
+  add_building(shape, walls, city.windows, city.facades);
+}
+
+void add_buildings(City& city) {
+  WallBuilders walls;
+  for (int i = 0; i < city.plan.blocks; ++i)
+    for (int j = 0; j < city.plan.blocks; ++j) add_block(city, i, j, walls);
+  add_landmark(city, walls[2]);
+  for (std::size_t k = 0; k < walls.size(); ++k) {
+    const std::string name = "walls " + std::to_string(k + 1);
+    add_static(city.scene, walls[k], name, add_surface(city.scene, name, kWallColors[k], 0.9f));
+  }
+}
+
+// --- windows
+// --------------------------------------------------------------------------------------------------
+
+constexpr std::array<vec3, 8> kWindowRadiance = {
+    vec3(2.3f, 1.45f, 0.65f), vec3(1.6f, 1.05f, 0.5f), vec3(2.6f, 1.9f, 1.1f),  vec3(1.8f, 1.75f, 1.6f),
+    vec3(0.9f, 0.55f, 0.25f), vec3(0.35f, 0.6f, 1.2f), vec3(1.3f, 0.7f, 0.28f), vec3(3.2f, 2.5f, 1.6f)};
+constexpr std::size_t kShopColor = 7;
+
+// Lights as many panes as make up `triangles`; each is cut finer when there are too few.
+void add_windows(City& city, std::size_t triangles) {
+  int cuts = 1;
+  while (2 * static_cast<std::size_t>(cuts * cuts) * city.windows.size() < triangles) ++cuts;
+  const auto per_window = 2 * static_cast<std::size_t>(cuts * cuts);
+  const std::vector<bool> lit =
+      choose_lit(city.windows, (triangles + per_window / 2) / per_window, city.plan.seed);
+  std::array<MeshBuilder, kWindowRadiance.size()> panes;
+  MeshBuilder dark;
+  for (std::size_t i = 0; i < city.windows.size(); ++i) {
+    const WindowSlot& slot = city.windows[i];
+    if (!lit[i]) {
+      dark.quad(slot.corner, slot.u, slot.v);
+      continue;
+    }
+    RandomStream random(city.plan.seed, kWindowColor, static_cast<std::uint32_t>(i));
+    const std::size_t color =
+        slot.shop ? (random.chance(0.6f) ? kShopColor : 3) : static_cast<std::size_t>(random.integer(7));
+    panes[color].quad(slot.corner, slot.u, slot.v, cuts, cuts);
+  }
+  for (std::size_t c = 0; c < panes.size(); ++c) {
+    const std::string name = "lit windows " + std::to_string(c + 1);
+    city.emissive += panes[c].triangle_count();
+    if (!panes[c].empty())
+      add_static(city.scene, panes[c], name, add_emitter(city.scene, name, kWindowRadiance[c], vec3(0.1f)));
+  }
+  add_static(city.scene, dark, "dark windows",
+             add_surface(city.scene, "dark glass", vec3(0.04f, 0.05f, 0.06f), 0.3f));
+}
+
+// --- street lamps
+// ---------------------------------------------------------------------------------------------
+
+struct LampModel {
+  int post, lens;
+  std::size_t lens_triangles;
+};
+// Origin at the foot; the arm reaches along +x over the road.
+LampModel add_lamp_model(Scene& scene) {
+  MeshBuilder builder;
+  builder.cylinder(vec3(0), vec3(0, 6.3f, 0), 0.09f, 0.06f, 8);
+  builder.cylinder(vec3(-0.02f, 6.25f, 0), vec3(1.5f, 6.6f, 0), 0.05f, 0.045f, 6);
+  builder.box(vec3(1.3f, 6.56f, -0.2f), vec3(2.1f, 6.72f, 0.2f));
+  LampModel model{};
+  model.post =
+      add_mesh(scene, builder, "lamp post", add_surface(scene, "lamp post", vec3(0.1f, 0.11f, 0.12f), 0.5f));
+  std::vector<vec3> rim;
+  for (int k = 0; k < 8; ++k)  // counter-clockwise seen from below
+    rim.emplace_back(1.7f + 0.3f * cosine(kPi * static_cast<float>(k) / 4), 6.55f,
+                     0.17f * sine(kPi * static_cast<float>(k) / 4));
+  builder.polygon(rim);
+  model.lens_triangles = builder.triangle_count();
+  model.lens = add_mesh(scene, builder, "lamp lens", add_emitter(scene, "lamp lens", vec3(250, 165, 80)));
+  return model;
+}
+
+// Evenly along both kerbs of every street.
+void add_lamps(City& city, std::size_t triangles) {
+  const LampModel model = add_lamp_model(city.scene);
+  const std::size_t kerbs = 4 * static_cast<std::size_t>(city.plan.streets() * city.plan.blocks);
+  const std::size_t wanted = std::min(kMostLamps, triangles / model.lens_triangles);
+  const int each = std::max(1, static_cast<int>((wanted + kerbs / 2) / kerbs));
+  for (const bool along_x : {false, true})
+    for (int k = 0; k < city.plan.streets(); ++k)
+      for (int b = 0; b < city.plan.blocks; ++b)
+        for (const float side : {-1.0f, 1.0f})
+          for (int i = 0; i < each; ++i) {
+            const float spacing = (kPitch - 2 * kHalfRoad - 3) / static_cast<float>(each);
+            const float shift = side > 0 ? 0.3f : 0.7f;  // the two kerbs alternate
+            const float at = city.plan.line(b) + kHalfRoad + 1.5f + spacing * (static_cast<float>(i) + shift);
+            const float line = city.plan.line(k) + side * (kHalfRoad + 0.5f);
+            const float turn = along_x ? side * kPi / 2 : (side > 0 ? kPi : 0.0f);
+            add_node(city.scene, "lamp", {model.post, model.lens},
+                     along_x ? vec3(at, kCurb, line) : vec3(line, kCurb, at),
+                     axis_angle(vec3(0, 1, 0), turn));
+            city.emissive += model.lens_triangles;
+          }
+}
+
+// --- strings of bulbs
+// -----------------------------------------------------------------------------------------
+
+constexpr std::array<vec3, 6> kBulbRadiance = {vec3(60, 34, 12), vec3(64, 10, 8),  vec3(12, 50, 14),
+                                               vec3(10, 22, 72), vec3(56, 12, 50), vec3(54, 44, 10)};
+constexpr int kBulbsPerColor = 4;
+
+struct StringModel {
+  std::vector<int> meshes;  // wire, then one a colour
+  std::size_t triangles = 0;
+};
+// Hangs along +x from the origin to (kStreet,0,0).
+StringModel add_string_model(Scene& scene, int subdivisions) {
+  const auto hang = [](float s) { return vec3(kStreet * s, -4.4f * s * (1 - s), 0); };
+  StringModel model;
+  MeshBuilder builder;
+  constexpr int kPieces = 16;
+  for (int i = 0; i < kPieces; ++i)
+    builder.cylinder(hang(static_cast<float>(i) / kPieces), hang(static_cast<float>(i + 1) / kPieces), 0.012f,
+                     0.012f, 4, false);
+  model.meshes.push_back(add_mesh(scene, builder, "wire", add_surface(scene, "wire", vec3(0.04f))));
+  const int count = kBulbsPerColor * static_cast<int>(kBulbRadiance.size());
+  for (std::size_t c = 0; c < kBulbRadiance.size(); ++c) {
+    for (int k = static_cast<int>(c); k < count; k += static_cast<int>(kBulbRadiance.size()))
+      builder.icosphere(hang((static_cast<float>(k) + 0.5f) / static_cast<float>(count)) - vec3(0, 0.13f, 0),
+                        0.085f, subdivisions);
+    model.triangles += builder.triangle_count();
+    const std::string name = "bulbs " + std::to_string(c + 1);
+    model.meshes.push_back(add_mesh(scene, builder, name, add_emitter(scene, name, kBulbRadiance[c])));
+  }
+  return model;
+}
+
+struct StringSpot {
+  vec3 anchor;
+  bool along_x;  // spans a street that runs along z
+};
+// Places for strings, the main street first, then the others from the camera outwards.
+std::vector<StringSpot> string_spots(const Plan& plan, float spacing) {
+  std::vector<StringSpot> spots;
+  const auto near_line = [&](float at) {
+    const float offset = (at - plan.lo()) / kPitch;
+    return std::abs(offset - std::round(offset)) * kPitch < kStreet / 2 + 0.5f;
+  };
+  const auto add_street = [&](bool along_z, float line) {
+    for (float at = plan.hi() - 4; at > plan.lo(); at -= spacing)
+      if (!near_line(at))
+        spots.push_back(along_z ? StringSpot{vec3(line - kStreet / 2, 0, at), true}
+                                : StringSpot{vec3(at, 0, line + kStreet / 2), false});
+  };
+  std::vector<int> order;
+  for (int k = 0; k < plan.streets(); ++k) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return std::abs(plan.line(a)) < std::abs(plan.line(b)); });
+  for (const int k : order) {
+    add_street(true, plan.line(k));
+    add_street(false, plan.line(k));
+  }
+  return spots;
+}
+
+void add_strings(City& city, std::size_t triangles, int subdivisions) {
+  const StringModel model = add_string_model(city.scene, subdivisions);
+  const std::size_t wanted = std::max<std::size_t>(1, triangles / model.triangles);
+  float spacing = 9;
+  std::vector<StringSpot> spots = string_spots(city.plan, spacing);
+  while (spots.size() < wanted) spots = string_spots(city.plan, spacing *= 0.8f);
+  for (std::size_t i = 0; i < wanted; ++i) {
+    RandomStream random(city.plan.seed, kBulb, static_cast<std::uint32_t>(i));
+    const vec3 anchor = spots[i].anchor + vec3(0, random.uniform(6.2f, 7.6f), 0);
+    const vec4 base = axis_angle(vec3(0, 1, 0), spots[i].along_x ? 0.0f : kPi / 2);
+    const int stand = add_node(city.scene, "string", {}, anchor, base);
+    const int swing = add_node(city.scene, "swinging bulbs", model.meshes, vec3(0), vec4(0, 0, 0, 1), stand);
+    const float phase = random.uniform(), angle = random.uniform(0.15f, 0.4f);
+    const float beats = static_cast<float>(2 + random.integer(2));
+    animate_rotation(city.scene, swing, kPeriod, 12, Interpolation::kCubicSpline, [=](float t) {
+      return axis_angle(vec3(1, 0, 0), angle * sine(2 * kPi * (beats * t + phase)));
+    });
+    city.emissive += model.triangles;
+  }
+}
+
+// --- neon signs
+// -----------------------------------------------------------------------------------------------
+
+constexpr std::array<vec3, 6> kNeonRadiance = {vec3(46, 3, 6),  vec3(4, 18, 58), vec3(3, 40, 16),
+                                               vec3(44, 4, 40), vec3(48, 20, 2), vec3(6, 36, 40)};
+constexpr std::array<std::string_view, 14> kWords = {"HOTEL",   "CAFE",  "BAR",     "JAZZ",  "OPEN",
+                                                     "CINEMA",  "CLUB",  "NOODLES", "PIZZA", "DANCE",
+                                                     "KARAOKE", "BOOKS", "TAXI",    "LUX"};
+using NeonBuilders = std::array<MeshBuilder, kNeonRadiance.size()>;
+
+// Letters downwards on both faces of a board that stands out from the wall at `at` metres along it.
+void add_blade_sign(const Facade& wall, float at, std::string_view word, float height, MeshBuilder& tubes,
+                    MeshBuilder& boards) {
+  const vec2 size = neon_word_size(word, height, true);
+  const float width = size.x + 0.3f, bottom = 4.8f;
+  const vec3 foot = wall.origin + wall.along * at;
+  // Frame of the board: x out of the wall, y up, z against the wall's direction.
+  const mat4 frame(vec4(wall.normal, 0), vec4(0, 1, 0, 0), vec4(-wall.along, 0), vec4(foot, 1));
+  boards.set_transform(frame);
+  boards.box(vec3(0.35f, bottom - 0.2f, -0.06f), vec3(0.35f + width, bottom + size.y + 0.2f, 0.06f));
+  boards.box(vec3(-0.1f, bottom + 0.3f, -0.03f), vec3(0.36f, bottom + 0.4f, 0.03f));
+  boards.set_transform(mat4(1));
+  tubes.set_transform(frame);
+  add_neon_word(tubes, word, vec3(0.5f, bottom, 0.13f), height, true);
+  const mat4 other(vec4(-wall.normal, 0), vec4(0, 1, 0, 0), vec4(wall.along, 0), vec4(foot, 1));
+  tubes.set_transform(other);
+  add_neon_word(tubes, word, vec3(-0.5f - size.x, bottom, 0.13f), height, true);
+  tubes.set_transform(mat4(1));
+}
+
+// Letters in a row on a board flat on the wall, over the ground floor.
+void add_front_sign(const Facade& wall, float at, std::string_view word, float height, MeshBuilder& tubes,
+                    MeshBuilder& boards) {
+  const vec2 size = neon_word_size(word, height, false);
+  const mat4 frame(vec4(wall.along, 0), vec4(0, 1, 0, 0), vec4(wall.normal, 0),
+                   vec4(wall.origin + wall.along * at, 1));
+  const float left = -size.x / 2, bottom = 3.45f;
+  boards.set_transform(frame);
+  boards.box(vec3(left - 0.25f, bottom - 0.2f, 0.3f),
+             vec3(left + size.x + 0.25f, bottom + size.y + 0.2f, 0.4f));
+  boards.set_transform(mat4(1));
+  tubes.set_transform(frame);
+  add_neon_word(tubes, word, vec3(left, bottom, 0.48f), height, false);
+  tubes.set_transform(mat4(1));
+}
+
+struct SignSpot {
+  std::size_t facade;
+  float at;
+  float order;
+};
+// Spots along street walls, the ones near the camera's street tending to come first.
+std::vector<SignSpot> sign_spots(const City& city) {
+  std::vector<SignSpot> spots;
+  for (std::size_t f = 0; f < city.facades.size(); ++f) {
+    const Facade& wall = city.facades[f];
+    const vec3 front = wall.origin + wall.along * (wall.width / 2) + wall.normal * (kStreet / 2);
+    const float offset = glm::dot(front, glm::abs(wall.normal)) / kPitch - city.plan.line(0) / kPitch;
+    if (std::abs(offset - std::round(offset)) > 0.01f) continue;  // looks into the block
+    const bool main_street = std::abs(wall.normal.x) > 0.5f && std::abs(front.x) < 1;
+    RandomStream random(city.plan.seed, kSign, static_cast<std::uint32_t>(f));
+    for (float at = 2.5f; at < wall.width - 2; at += 5)
+      spots.push_back(
+          {f, at,
+           random.uniform() * (main_street ? 0.06f : 1.0f) + (front.z > city.plan.camera_z() ? 0.5f : 0.0f)});
+  }
+  std::stable_sort(spots.begin(), spots.end(),
+                   [](const SignSpot& a, const SignSpot& b) { return a.order < b.order; });
+  return spots;
+}
+
+void add_signs(City& city, std::size_t triangles) {
+  NeonBuilders tubes;
+  MeshBuilder boards;
+  std::size_t placed = 0, index = 0;
+  for (const SignSpot& spot : sign_spots(city)) {
+    if (placed >= triangles) break;
+    RandomStream random(city.plan.seed, kSign, static_cast<std::uint32_t>(0x10000 + index++));
+    const std::string_view word = kWords[static_cast<std::size_t>(random.integer(kWords.size()))];
+    MeshBuilder& color = tubes[static_cast<std::size_t>(random.integer(static_cast<int>(tubes.size())))];
+    const std::size_t before = color.triangle_count();
+    const Facade& wall = city.facades[spot.facade];
+    if (random.chance(0.6f) && wall.height > 11)
+      add_blade_sign(wall, spot.at, word, random.uniform(0.55f, 0.8f), color, boards);
+    else
+      add_front_sign(wall, spot.at, word, random.uniform(0.45f, 0.6f), color, boards);
+    placed += color.triangle_count() - before;
+  }
+  for (std::size_t c = 0; c < tubes.size(); ++c) {
+    const std::string name = "neon " + std::to_string(c + 1);
+    if (!tubes[c].empty())
+      add_static(city.scene, tubes[c], name, add_emitter(city.scene, name, kNeonRadiance[c]));
+  }
+  add_static(city.scene, boards, "sign boards", add_surface(city.scene, "sign board", vec3(0.06f), 0.5f));
+  city.emissive += placed;
+}
+
+// --- traffic
+// --------------------------------------------------------------------------------------------------
+
+struct CarModel {
+  std::vector<int> meshes;
+  std::size_t triangles;
+};
+// Origin on the road below the middle; drives towards -z.
+CarModel add_car_model(Scene& scene, const std::string& name, vec3 paint) {
+  MeshBuilder builder;
+  builder.box(vec3(-0.9f, 0.35f, -2.15f), vec3(0.9f, 0.95f, 2.15f));
+  const vec3 roof[] = {
+      {-0.68f, 1.45f, 1.2f}, {0.68f, 1.45f, 1.2f}, {0.68f, 1.45f, -0.5f}, {-0.68f, 1.45f, -0.5f}};
+  const vec3 belt[] = {
+      {-0.85f, 0.95f, 1.8f}, {0.85f, 0.95f, 1.8f}, {0.85f, 0.95f, -1.15f}, {-0.85f, 0.95f, -1.15f}};
+  builder.polygon(roof);
+  const int body = add_mesh(scene, builder, name, add_surface(scene, name, paint, 0.35f));
+  for (int k = 0; k < 4; ++k)
+    builder.polygon(std::array{belt[k], belt[(k + 1) % 4], roof[(k + 1) % 4], roof[k]});
+  for (const float z : {-1.35f, 1.35f})
+    for (const float x : {-0.92f, 0.74f})
+      builder.cylinder(vec3(x, 0.33f, z), vec3(x + 0.18f, 0.33f, z), 0.33f, 0.33f, 12);
+  const int dark = add_mesh(scene, builder, name + " glass and tyres",
+                            add_surface(scene, name + " glass and tyres", vec3(0.04f), 0.4f));
+  for (const float x : {-0.8f, 0.4f})
+    builder.quad(vec3(x + 0.4f, 0.55f, -2.16f), vec3(-0.4f, 0, 0), vec3(0, 0.2f, 0));
+  std::size_t triangles = builder.triangle_count();
+  const int heads =
+      add_mesh(scene, builder, "head lamps", add_emitter(scene, "head lamps", vec3(90, 86, 76)));
+  for (const float x : {-0.82f, 0.42f})
+    builder.quad(vec3(x, 0.62f, 2.16f), vec3(0.4f, 0, 0), vec3(0, 0.15f, 0));
+  triangles += builder.triangle_count();
+  const int tails =
+      add_mesh(scene, builder, "tail lamps", add_emitter(scene, "tail lamps", vec3(30, 1.2f, 0.8f)));
+  return {{body, dark, heads, tails}, triangles};
+}
+
+// One lane: cars one block apart that advance one block in a period, so that the loop has no seam.
+void add_lane(City& city, const CarModel& car, bool along_x, float line, float direction, float phase) {
+  PunctualLight beam;
+  beam.name = "head beam";
+  beam.type = LightType::kSpot;
+  beam.color = vec3(70, 66, 58);
+  beam.inner_cone = 0.15f;
+  beam.outer_cone = 0.5f;
+  beam.range = 45;
+  const float turn = along_x ? (direction > 0 ? -kPi / 2 : kPi / 2) : (direction > 0 ? kPi : 0.0f);
+  const float lane = line + (along_x ? direction : -direction) * 2.4f;
+  for (int b = 0; b < city.plan.blocks; ++b) {
+    const auto place = [=, plan = city.plan](float t) {
+      const float at =
+          direction > 0 ? plan.line(b) + kPitch * (t + phase) : plan.line(b + 1) - kPitch * (t + phase);
+      return along_x ? vec3(at, 0, lane) : vec3(lane, 0, at);
+    };
+    const int node = add_node(city.scene, "car", car.meshes, place(0), axis_angle(vec3(0, 1, 0), turn));
+    animate_translation(city.scene, node, kPeriod, 1, Interpolation::kLinear, place);
+    add_light_node(city.scene, beam, vec3(0, 0.65f, -2.3f), looking_along(vec3(0, -0.12f, -1)), node);
+    city.emissive += car.triangles;
+  }
+}
+
+void add_traffic(City& city) {
+  const std::array<CarModel, 3> cars = {add_car_model(city.scene, "red car", vec3(0.45f, 0.05f, 0.04f)),
+                                        add_car_model(city.scene, "yellow cab", vec3(0.75f, 0.50f, 0.06f)),
+                                        add_car_model(city.scene, "silver car", vec3(0.55f, 0.57f, 0.60f))};
+  for (const bool along_x : {false, true})
+    for (int k = 0; k < city.plan.streets(); ++k)
+      for (const float direction : {-1.0f, 1.0f}) {
+        RandomStream random(city.plan.seed, kTraffic,
+                            static_cast<std::uint32_t>(k * 4 + (along_x ? 2 : 0) + (direction > 0 ? 1 : 0)));
+        // The two directions of streets take the crossings half a period apart.
+        const float phase = (along_x ? 0.5f : 0.0f) + random.uniform(-0.08f, 0.08f) + 0.3f;
+        add_lane(city, cars[static_cast<std::size_t>(random.integer(3))], along_x, city.plan.line(k),
+                 direction, phase);
+      }
+}
+
+// --- drifting lanterns
+// ----------------------------------------------------------------------------------------
+
+// Point lights below small dark kites that wander over the main street.
+void add_lanterns(City& city) {
+  MeshBuilder builder;
+  builder.cylinder(vec3(0), vec3(0, 0.35f, 0), 0.3f, 0, 6);
+  const int kite = add_mesh(city.scene, builder, "kite", add_surface(city.scene, "kite", vec3(0.5f)));
+  for (std::uint32_t i = 0; i < 24; ++i) {
+    RandomStream random(city.plan.seed, kLantern, i);
+    const vec3 centre(random.uniform(-5, 5), random.uniform(8, 13),
+                      glm::mix(city.plan.lo(), city.plan.camera_z(), random.uniform()));
+    const float phase = random.uniform(), wide = random.uniform(0.6f, 2), deep = random.uniform(1, 3);
+    const int node = add_node(city.scene, "lantern", {kite}, centre);
+    animate_translation(city.scene, node, kPeriod, 12, Interpolation::kCubicSpline, [=](float t) {
+      const float a = 2 * kPi * (t + phase);
+      return centre + vec3(wide * sine(a), 0.5f * sine(2 * a), deep * cosine(a));
+    });
+    PunctualLight light;
+    light.name = "lantern light";
+    light.color = 0.35f * kBulbRadiance[i % kBulbRadiance.size()];
+    add_light_node(city.scene, light, vec3(0, -0.12f, 0), vec4(0, 0, 0, 1), node);
+  }
+}
+
+Scene make(const Parameters& parameters) {
+  City city;
+  city.plan = {parameters.integer("blocks"), parameters.seed()};
+  const auto lights = static_cast<std::size_t>(parameters.integer("lights"));
+  const auto share = [&](float part) { return static_cast<std::size_t>(part * static_cast<float>(lights)); };
+  add_ground(city);
+  add_markings(city);
+  add_buildings(city);
+  add_traffic(city);
+  add_lanterns(city);
+  add_lamps(city, share(kLampShare));
+  add_strings(city, share(kBulbShare), lights > 200000 ? 1 : 0);
+  add_signs(city, share(kNeonShare));
+  add_windows(city, lights > city.emissive ? lights - city.emissive : 0);
+  const float z = city.plan.camera_z();
+  add_camera(city.scene, "street", vec3(1.6f, 3.4f, z), vec3(-0.8f, 4.6f, z - 40), 48);
+  add_camera(city.scene, "roofs", vec3(30, 46, z + 20), vec3(-10, 0, z - 90), 50);
+  return std::move(city.scene);
+}
+
+}  // namespace
+
+Definition night_city() {
+  return {"night-city",
+          "city streets at night: windows, lamps, neon, swinging bulbs, traffic; all lights local",
+          true,
+          {{"lights", "40000", "emissive triangles, about (5000 to 4000000)", 5000, 4e6, false, {}},
+           {"blocks", "4", "city blocks a side (2 to 12)", 2, 12, false, {}},
+           seed_parameter()},
+          make};
+}
+
+}  // namespace lumigrove::builtin
