@@ -1,0 +1,63 @@
+# One command each for what most people want. Everything here is also plain CMake: see CMakePresets.json.
+# Variables: ARCH (-march value, default native) · CI=1 (warnings are errors) · JOBS (parallel jobs, default: all cores)
+
+ARCH ?= native
+JOBS ?= $(shell nproc)
+WERROR := $(if $(CI),ON,OFF)
+RELEASE := build/release
+LUMIGROVE := $(RELEASE)/apps/lumigrove/lumigrove
+# Looked up when used, because `make dependencies` may have just installed something.
+CCACHE = $(if $(shell command -v ccache),-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+CONFIGURE = cmake --preset $(1) -DLUMIGROVE_ARCH=$(ARCH) -DLUMIGROVE_WERROR=$(WERROR) $(CCACHE)
+CTEST = ctest --test-dir $(1) --output-on-failure --parallel $(JOBS)
+
+.PHONY: help
+help:
+	@echo "make demo      install what is missing, build, render the built-in night city to out/"
+	@echo "make test      install what is missing, build, run every test"
+	@echo "make build     the library and the tool, in $(RELEASE)"
+	@echo "make bench     build and run the bench"
+	@echo "make sanitize  every test under AddressSanitizer and UndefinedBehaviorSanitizer"
+	@echo "make format    clang-format over all sources"
+	@echo "make clean     remove build/ and out/"
+
+.PHONY: dependencies
+dependencies:
+	@scripts/install-dependencies.sh
+
+.PHONY: configure
+configure: dependencies
+	$(call CONFIGURE,release)
+
+.PHONY: build
+build: configure
+	cmake --build $(RELEASE) --parallel $(JOBS) --target lumigrove_tool
+
+.PHONY: demo
+demo: build
+	@mkdir -p out
+	$(LUMIGROVE) render night-city --size 1280 720 --spp 16 -o out/night-city.exr -o out/night-city.png --stats
+
+.PHONY: test
+test: configure
+	cmake --build $(RELEASE) --parallel $(JOBS)
+	$(call CTEST,$(RELEASE))
+
+.PHONY: bench
+bench: configure
+	cmake --build $(RELEASE) --parallel $(JOBS) --target lumigrove_bench
+	$(RELEASE)/bench/lumigrove-bench
+
+.PHONY: sanitize
+sanitize: dependencies
+	$(call CONFIGURE,sanitize)
+	cmake --build build/sanitize --parallel $(JOBS)
+	$(call CTEST,build/sanitize)
+
+.PHONY: format
+format:
+	git ls-files '*.h' '*.cpp' '*.cu' | xargs clang-format -i
+
+.PHONY: clean
+clean:
+	rm -rf build out
