@@ -1,14 +1,18 @@
-// Proof that the methods are single-source: this unit compiles every kernel header for the device through the CUDA
-// launcher. It is compiled by `make test` when nvcc is found and never run. check_kernels.cmake fails when a
+// Proof that the methods are single-source: this unit compiles every kernel header for the device through the
+// CUDA launcher. It is compiled by `make test` when nvcc is found and never run. check_kernels.cmake fails
+// when a
 // *_kernel.h file or a kernel struct is missing here.
 #include <cuda.h>
 
 #include <cstdint>
 
 #include "base/rng.h"
+#include "base/sampling.h"
+#include "base/srgb.h"
 #include "base/vec.h"
 #include "device/cuda/launch.h"
 #include "lights/light_set.h"
+#include "scene/bsdf.h"
 #include "scene/scene_view.h"
 #include "scene/surface.h"
 #include "scene/texture.h"
@@ -20,7 +24,7 @@
 namespace lumigrove {
 namespace {
 
-// Calls the device functions that belong to no kernel of their own.
+// Call the device functions that belong to no kernel of their own.
 struct BaseKernel {
   SceneView scene;
   LightView lights;
@@ -36,14 +40,41 @@ struct BaseKernel {
     const MaterialView& material = scene.materials[static_cast<std::size_t>(i)];
     const vec4 texel = sample_texture(scene, material.base_color_texture, vec2(u), vec2(box.lo));
     const Emitter& emitter = lights.emitters[static_cast<std::size_t>(i)];
-    Surface surface;
-    surface.position = emitter.punctual() ? emitter.p0 : box.centre();
-    out[i] = vec4(surface.position, is_finite(p) ? luminance(vec3(texel)) : box.diagonal());
+    const vec3 position = emitter.punctual() ? emitter.p0 : box.centre();
+    out[i] = vec4(position, is_finite(p) ? luminance(vec3(texel)) : box.diagonal());
+  }
+};
+
+struct WarpsKernel {
+  Rng rng;
+  float* out;
+
+  LUMI_HD void operator()(int i) const {
+    const vec4 u = rng.uniform4(static_cast<std::uint32_t>(i));
+    const vec2 v(u);
+    const vec3 w = sample_cosine_hemisphere(v) * pdf_cosine_hemisphere(u.z) +
+                   sample_uniform_sphere(v) * pdf_uniform_sphere() +
+                   sample_uniform_cone(v, u.w) * pdf_uniform_cone(u.w);
+    const vec2 b = sample_uniform_triangle(v) * pdf_uniform_triangle(u.w) + sample_disc(v) * pdf_disc();
+    out[i] = srgb_to_linear(b.x) + linear_to_srgb(b.y) + max_component(w);
+  }
+};
+
+struct BsdfKernel {
+  const Surface* surfaces;
+  Rng rng;
+  vec4* out;
+
+  LUMI_HD void operator()(int i) const {
+    const BsdfSample sample = bsdf_sample(surfaces[i], vec3(rng.uniform4(static_cast<std::uint32_t>(i))));
+    out[i] = vec4(sample.weight + bsdf_eval(surfaces[i], sample.wi), bsdf_pdf(surfaces[i], sample.wi));
   }
 };
 
 }  // namespace
 
 template void cuda::launch<BaseKernel>(int, const BaseKernel&, cudaStream_t);
+template void cuda::launch<WarpsKernel>(int, const WarpsKernel&, cudaStream_t);
+template void cuda::launch<BsdfKernel>(int, const BsdfKernel&, cudaStream_t);
 
 }  // namespace lumigrove
