@@ -63,7 +63,7 @@ std::string frame_file(const std::string& pattern, int frame) {
   else if (place == "%d")
     digits = std::to_string(frame);
   else
-    digits = fmt::format(place[1] == '0' ? "{:0{}}" : "{:{}}", frame, place[place.size() - 2] - '0');
+    digits = fmt::format("{:0{}}", frame, place[2] - '0');
   return (path.parent_path() / (match.prefix().str() + digits + match.suffix().str())).string();
 }
 
