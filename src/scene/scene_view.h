@@ -41,8 +41,8 @@ struct MeshView {
 
 struct InstanceView {
   mat4x3 to_world;
-  mat3 normal_to_world;   // cofactors; keeps orientation of normals also under mirroring (see `flip`)
-  float flip;             // -1 when to_world mirrors: geometric normal of (p1-p0)x(p2-p0) in world must be negated
+  mat3 normal_to_world;   // flip * cofactors: outward normals stay outward also under mirroring; not unit length
+  float flip;             // -1 when to_world mirrors: the front is on the side of flip * cross(p1-p0, p2-p0), world
   int mesh;
 };
 

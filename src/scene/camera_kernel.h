@@ -1,0 +1,104 @@
+// Primary rays of a pinhole camera. Pixel (0,0) is top left; the field of view is vertical.
+#pragma once
+
+#include <span>
+
+#include "base/rng.h"
+#include "base/vec.h"
+#include "lumigrove/scene.h"
+#include "trace/ray.h"
+
+namespace lumigrove {
+
+// Pixels [x0, x1) x [y0, y1) of an image.
+struct PixelWindow {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+
+  LUMI_HD int width() const { return x1 - x0; }
+  LUMI_HD int height() const { return y1 - y0; }
+  LUMI_HD int count() const { return width() * height(); }
+};
+
+// Neighbours in a launch are neighbours in the image, so that a packet of 16 rays covers a square.
+inline constexpr int kPixelBlock = 4;
+
+struct Pixel {
+  int x, y;
+};
+
+// Launch index -> pixel: bands of kPixelBlock rows, each cut into blocks of kPixelBlock columns (the last
+// band and the last block of a band may be smaller), pixels row by row inside a block. Every pixel of the
+// window comes once.
+LUMI_HD inline Pixel pixel_of_index(const PixelWindow& window, int index) {
+  const int band = index / (kPixelBlock * window.width());
+  const int in_band = index - band * kPixelBlock * window.width();
+  const int rows = glm::min(kPixelBlock, window.height() - band * kPixelBlock);
+  const int block = in_band / (kPixelBlock * rows);
+  const int in_block = in_band - block * kPixelBlock * rows;
+  const int columns = glm::min(kPixelBlock, window.width() - block * kPixelBlock);
+  const int row = in_block / columns;
+  return {window.x0 + block * kPixelBlock + in_block - row * columns, window.y0 + band * kPixelBlock + row};
+}
+
+// A camera for an image of `width` x `height` pixels. A point of the image plane at distance 1 is
+// forward + right * x + down * y, with (x, y) = corner + pixel position * pixel size.
+struct CameraView {
+  vec3 position, right, down, forward;
+  vec2 corner, pixel_size;
+  float znear;
+  int width, height;
+};
+
+inline CameraView make_camera_view(const CameraInstance& camera, int width, int height) {
+  const float size = 2.0f * glm::tan(0.5f * camera.camera.vertical_fov) / static_cast<float>(height);
+  CameraView view;
+  view.position = camera.position;
+  view.right = camera.right;
+  view.down = -camera.up;
+  view.forward = camera.forward;
+  view.pixel_size = vec2(size);
+  view.corner = vec2(static_cast<float>(width), static_cast<float>(height)) * (-0.5f * size);
+  view.znear = camera.camera.znear;
+  view.width = width;
+  view.height = height;
+  return view;
+}
+
+// Ray through `at` (in pixels from the top left corner of the image); unit direction; starts at the near
+// plane.
+LUMI_HD inline Ray camera_ray(const CameraView& camera, vec2 at) {
+  const vec2 p = camera.corner + at * camera.pixel_size;
+  const vec3 d = camera.forward + camera.right * p.x + camera.down * p.y;
+  const float length = glm::sqrt(length_squared(d));
+  Ray ray;
+  ray.origin = camera.position;
+  ray.direction = d * (1.0f / length);
+  ray.tmin = camera.znear * length;
+  ray.tmax = kInfinity;
+  return ray;
+}
+
+// The number of a pixel in random numbers: of the whole image, so that a crop window shows the same noise.
+LUMI_HD inline std::uint32_t rng_pixel(const CameraView& camera, Pixel pixel) {
+  return static_cast<std::uint32_t>(pixel.y) * static_cast<std::uint32_t>(camera.width) +
+         static_cast<std::uint32_t>(pixel.x);
+}
+
+// One ray a pixel of the window, in the order of `pixel_of_index`.
+struct CameraKernel {
+  CameraView camera;
+  PixelWindow window;
+  std::span<Ray> rays;
+  std::uint32_t seed = 0, frame = 0;
+  bool jitter = true;  // uniform in the pixel; otherwise its centre
+
+  LUMI_HD void operator()(int i) const {
+    const Pixel pixel = pixel_of_index(window, i);
+    vec2 offset(0.5f);
+    if (jitter) offset = vec2(Rng{seed, frame, rng_pixel(camera, pixel)}.uniform4(kDimPixel));
+    const vec2 at = vec2(static_cast<float>(pixel.x), static_cast<float>(pixel.y)) + offset;
+    rays[static_cast<std::size_t>(i)] = camera_ray(camera, at);
+  }
+};
+
+}  // namespace lumigrove
