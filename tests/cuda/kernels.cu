@@ -13,8 +13,10 @@
 #include "device/cuda/launch.h"
 #include "lights/light_set.h"
 #include "scene/bsdf.h"
+#include "scene/camera_kernel.h"
 #include "scene/scene_view.h"
 #include "scene/surface.h"
+#include "scene/surface_kernel.h"
 #include "scene/texture.h"
 
 #ifdef TBB_VERSION_MAJOR
@@ -76,5 +78,7 @@ struct BsdfKernel {
 template void cuda::launch<BaseKernel>(int, const BaseKernel&, cudaStream_t);
 template void cuda::launch<WarpsKernel>(int, const WarpsKernel&, cudaStream_t);
 template void cuda::launch<BsdfKernel>(int, const BsdfKernel&, cudaStream_t);
+template void cuda::launch<CameraKernel>(int, const CameraKernel&, cudaStream_t);
+template void cuda::launch<SurfaceKernel>(int, const SurfaceKernel&, cudaStream_t);
 
 }  // namespace lumigrove
