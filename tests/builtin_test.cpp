@@ -2,11 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <map>
 #include <tuple>
 
 #include "base/vec.h"
 #include "lumigrove/scene.h"
+#include "scene/builtin/mesh_builder.h"
 
 namespace lumigrove {
 namespace {
@@ -68,6 +71,37 @@ std::string error_of(const std::string& name) {
     return error.what();
   }
   return "";
+}
+
+TEST(MeshBuilder, SolidsAreClosedFaceOutwardsAndHaveTheirVolume) {
+  using builtin::MeshBuilder;
+  struct Solid {
+    const char* name;
+    std::function<void(MeshBuilder&)> add;
+    double volume, tolerance;
+  };
+  const vec2 spindle[] = {{0, 0}, {1, 1}, {0, 2}};
+  const auto circle = [](float turn) {
+    return vec3(2 * std::cos(2 * kPi * turn), 2 * std::sin(2 * kPi * turn), 0);
+  };
+  const double pi = kPi;
+  const Solid solids[] = {
+      {"box", [](MeshBuilder& b) { b.box(vec3(0.1f, 0.2f, 0.3f), vec3(1.1f, 2.2f, 3.3f)); }, 6, 1e-4},
+      {"rounded box", [](MeshBuilder& b) { b.rounded_box(vec3(0), vec3(1, 2, 3), 0.1f, 8); }, 5.9526, 0.01},
+      {"icosphere", [](MeshBuilder& b) { b.icosphere(vec3(5), 1, 4); }, 4 * pi / 3, 0.02},
+      {"sphere", [](MeshBuilder& b) { b.sphere(vec3(5), 1, 64, 64); }, 4 * pi / 3, 0.02},
+      {"cylinder", [](MeshBuilder& b) { b.cylinder(vec3(0), vec3(1, 1, 1), 0.5f, 0.5f, 64); },
+       0.25 * pi * std::sqrt(3.0), 0.01},
+      {"cone", [](MeshBuilder& b) { b.cylinder(vec3(0), vec3(0, 0, 2), 0.5f, 0, 64); }, pi / 6, 0.01},
+      {"torus", [=](MeshBuilder& b) { b.closed_tube(circle, 0.5f, 128, 64); }, pi * pi, 0.05},
+      {"spindle", [=](MeshBuilder& b) { b.lathe(vec3(1), spindle, 64, false); }, 2 * pi / 3, 0.01}};
+  for (const Solid& solid : solids) {
+    MeshBuilder builder;
+    solid.add(builder);
+    const Mesh mesh = builder.take(solid.name, 0);
+    EXPECT_TRUE(watertight(mesh)) << solid.name;
+    EXPECT_NEAR(signed_volume(mesh), solid.volume, solid.tolerance) << solid.name;
+  }
 }
 
 class EveryBuiltin : public testing::TestWithParam<std::string> {};
@@ -195,6 +229,34 @@ TEST(Builtin, CornellSolidsStayInTheBox) {
                     glm::all(glm::lessThan(q, vec3(1, 1.99f, 1.05f))));
       }
     }
+}
+
+TEST(Builtin, TowersHaveTheirEmissiveTriangles) {
+  EXPECT_EQ(emissive_triangles(make_builtin_scene("towers")), 4600u);
+  EXPECT_EQ(emissive_triangles(make_builtin_scene("towers?lights=100")), 100u);
+}
+
+TEST(Builtin, ColonnadeIsLitByTheSunAlone) {
+  const Scene scene = make_builtin_scene("colonnade?bays=5&sun=60");
+  EXPECT_EQ(emissive_triangles(scene), 0u);
+  const SceneState state = evaluate(scene, 0);
+  ASSERT_EQ(state.lights.size(), 1u);
+  EXPECT_EQ(state.lights[0].light.type, LightType::kDirectional);
+  EXPECT_NEAR(state.lights[0].direction.y, -std::sin(kPi / 3), 1e-3);
+  EXPECT_GT(evaluate(make_builtin_scene("colonnade?bays=9"), 0).bounds.extent().x,
+            state.bounds.extent().x + 11);
+}
+
+TEST(Builtin, LivingRoomBulbsAreClosedAndFaceOutwards) {
+  const Scene scene = make_builtin_scene("living-room");
+  int bulbs = 0;
+  for (const Mesh& mesh : scene.meshes) {
+    if (mesh.name.find("bulb") == std::string::npos) continue;
+    ++bulbs;
+    EXPECT_TRUE(watertight(mesh)) << mesh.name;
+    EXPECT_GT(signed_volume(mesh), 0) << mesh.name;
+  }
+  EXPECT_EQ(bulbs, 4);
 }
 
 TEST(Builtin, SingleHasExactlyOneLightOfTheKindAskedFor) {

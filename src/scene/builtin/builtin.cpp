@@ -9,7 +9,8 @@ namespace builtin {
 namespace {
 
 const std::vector<Definition>& definitions() {
-  static const std::vector<Definition> all = {night_city(), cornell_lights(), single(), fireflies()};
+  static const std::vector<Definition> all = {night_city(),  cornell_lights(), towers(),   colonnade(),
+                                              living_room(), single(),         fireflies()};
   return all;
 }
 

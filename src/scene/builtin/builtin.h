@@ -48,7 +48,10 @@ inline ParameterSpec seed_parameter() {
 // One file each.
 Definition night_city();
 Definition cornell_lights();
-Definition fireflies();
+Definition towers();
+Definition colonnade();
+Definition living_room();
 Definition single();
+Definition fireflies();
 
 }  // namespace lumigrove::builtin

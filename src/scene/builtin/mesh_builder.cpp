@@ -20,6 +20,9 @@ vec2 on_circle(int i, int n) {
   return vec2(static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)));
 }
 
+// Tangent of `part` of an eighth turn; exactly 1 at the end, where two faces of a rounded box meet.
+float tangent(float part) { return part == 1 ? 1.0f : sine(part * kPi / 4) / cosine(part * kPi / 4); }
+
 struct CrossSection {
   vec3 x, y;
 };
@@ -86,6 +89,46 @@ void MeshBuilder::box(vec3 lo, vec3 hi, unsigned faces) {
   if (faces & kTop) face(vec3(0, 1, 0), corner(0, 1, 1), corner(1, 1, 1), corner(1, 1, 0), corner(0, 1, 0));
   if (faces & kBack) face(vec3(0, 0, -1), corner(1, 0, 0), corner(0, 0, 0), corner(0, 1, 0), corner(1, 1, 0));
   if (faces & kFront) face(vec3(0, 0, 1), corner(0, 0, 1), corner(1, 0, 1), corner(1, 1, 1), corner(0, 1, 1));
+}
+
+void MeshBuilder::rounded_box(vec3 lo, vec3 hi, float radius, int steps) {
+  // On each face a grid: `steps` rows of the low edge's rounding, the flat middle, `steps` of the high
+  // edge's. A grid line is a corner of the inner box (0 low, 1 high) and a slope in [-1,1] that bends the
+  // direction off it.
+  struct Line {
+    int side;
+    float slope;
+  };
+  std::vector<Line> lines;
+  for (int k = 0; k <= steps; ++k)
+    lines.push_back({0, k == steps ? 0.0f : -tangent(fraction(steps - k, steps))});
+  for (int k = 0; k <= steps; ++k) lines.push_back({1, k == 0 ? 0.0f : tangent(fraction(k, steps))});
+  const vec3 inner[2] = {lo + radius, hi - radius};
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side) {
+      const int u = (axis + (side ? 1 : 2)) % 3, v = (axis + (side ? 2 : 1)) % 3;  // u x v points outwards
+      const std::uint32_t first = static_cast<std::uint32_t>(mesh_.positions.size());
+      for (const Line& at_v : lines)
+        for (const Line& at_u : lines) {
+          vec3 corner, direction;
+          corner[axis] = inner[side][axis];
+          corner[u] = inner[at_u.side][u];
+          corner[v] = inner[at_v.side][v];
+          direction[axis] = side ? 1.0f : -1.0f;
+          direction[u] = at_u.slope;
+          direction[v] = at_v.slope;
+          direction = glm::normalize(direction);
+          const vec3 position = corner + radius * direction;
+          vertex(position, direction, vec2(position[u] - lo[u], position[v] - lo[v]));
+        }
+      const std::uint32_t row = static_cast<std::uint32_t>(lines.size());
+      for (std::uint32_t j = 0; j + 1 < row; ++j)
+        for (std::uint32_t i = 0; i + 1 < row; ++i) {
+          const std::uint32_t a = first + j * row + i;
+          triangle(a, a + 1, a + row + 1);
+          triangle(a, a + row + 1, a + row);
+        }
+    }
 }
 
 void MeshBuilder::icosphere(vec3 centre, float radius, int subdivisions) {

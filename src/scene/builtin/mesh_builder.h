@@ -43,6 +43,9 @@ class MeshBuilder {
   void polygon(std::span<const vec3> corners);
   void box(vec3 lo, vec3 hi, unsigned faces = kAllFaces);
 
+  // Box with rounded edges and corners, `steps` cuts a quarter turn; closed.
+  void rounded_box(vec3 lo, vec3 hi, float radius, int steps);
+
   // Regular icosahedron, each face cut into 4^subdivisions; closed.
   void icosphere(vec3 centre, float radius, int subdivisions);
   // 2 * segments * (rings - 1) triangles; closed.

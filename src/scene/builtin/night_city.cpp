@@ -9,7 +9,7 @@
 #include "scene/builtin/building.h"
 #include "scene/builtin/builtin.h"
 #include "scene/builtin/neon.h"
-#include "scene/builtin/noise.h"
+#include "scene/builtin/procedural_image.h"
 #include "scene/builtin/random_stream.h"
 #include "scene/builtin/scene_parts.h"
 
@@ -46,53 +46,29 @@ struct City {
 // --- ground
 // ---------------------------------------------------------------------------------------------------
 
-// Wet asphalt: roughness falls in puddles, where the colour darkens too. Tiles without a seam.
-struct Asphalt {
-  int color_image, roughness_image;
-};
-Asphalt add_asphalt_images(Scene& scene, std::uint32_t seed) {
-  constexpr int kSize = 512;
-  Image8or32 color, rough;
-  color.name = "asphalt";
-  rough.name = "asphalt roughness";
-  color.width = color.height = rough.width = rough.height = kSize;
-  color.srgb = true;
-  const auto tiled = [&](vec2 p, float scale,
-                         std::uint32_t key) {  // four shifted copies blended to wrap around
-    const auto at = [&](float dx, float dy) {
-      return fractal_noise((p + vec2(dx, dy)) * scale + 300.0f, 4, key);
-    };
-    const vec2 w = p;
-    return glm::mix(glm::mix(at(0, 0), at(-1, 0), w.x), glm::mix(at(0, -1), at(-1, -1), w.x), w.y);
+// Wet asphalt: roughness falls in puddles, where the colour darkens too.
+int add_asphalt(Scene& scene, std::uint32_t seed) {
+  constexpr int kSize = 256;
+  const vec2 tile(14);  // metres
+  const auto puddle = [=](vec2 p) {
+    return glm::smoothstep(0.48f, 0.56f, tiling_noise(p, 7, 3, seed ^ 0x77u));
   };
-  for (int y = 0; y < kSize; ++y)
-    for (int x = 0; x < kSize; ++x) {
-      const vec2 p = (vec2(x, y) + 0.5f) / static_cast<float>(kSize);
-      const float puddle = glm::smoothstep(0.48f, 0.56f, tiled(p, 7, seed ^ 0x77u));
-      const float grain = tiled(p, 90, seed ^ 0x1234u);
-      const float shade = glm::mix(0.44f + 0.16f * grain, 0.33f + 0.05f * grain, puddle);
-      const float roughness = glm::mix(0.62f + 0.2f * grain, 0.34f, puddle);
-      const auto byte = [](float v) {
-        return static_cast<std::uint8_t>(std::lround(255 * glm::clamp(v, 0.0f, 1.0f)));
-      };
-      color.texels8.insert(color.texels8.end(), {byte(shade), byte(shade), byte(1.04f * shade), 255});
-      rough.texels8.insert(rough.texels8.end(), {255, byte(roughness), 0, 255});
-    }
-  scene.images.push_back(std::move(color));
-  scene.images.push_back(std::move(rough));
-  const int last = static_cast<int>(scene.images.size()) - 1;
-  return {last - 1, last};
+  const auto grain = [=](vec2 p) { return tiling_noise(p, 90, 1, seed ^ 0x1234u); };
+  const int material = add_surface(scene, "wet asphalt", vec3(1));
+  const int color = add_color_image(scene, "asphalt", kSize, [&](vec2 p) {
+    return glm::mix(0.14f + 0.12f * grain(p), 0.09f + 0.02f * grain(p), puddle(p)) * vec3(1, 1, 1.06f);
+  });
+  const int roughness = add_roughness_image(scene, "asphalt roughness", kSize, [&](vec2 p) {
+    return glm::mix(0.62f + 0.2f * grain(p), 0.34f, puddle(p));
+  });
+  scene.materials[material].base_color_texture = tiled(color, tile);
+  scene.materials[material].metallic_roughness_texture = tiled(roughness, tile);
+  return material;
 }
 
 void add_ground(City& city) {
   Scene& scene = city.scene;
-  const Asphalt images = add_asphalt_images(scene, city.plan.seed);
-  const int asphalt = add_surface(scene, "wet asphalt", vec3(1));
-  for (TextureUse* use :
-       {&scene.materials[asphalt].base_color_texture, &scene.materials[asphalt].metallic_roughness_texture})
-    use->scale = vec2(1.0f / 14);  // one tile is 14 m wide
-  scene.materials[asphalt].base_color_texture.image = images.color_image;
-  scene.materials[asphalt].metallic_roughness_texture.image = images.roughness_image;
+  const int asphalt = add_asphalt(scene, city.plan.seed);
   MeshBuilder builder;
   const float edge = city.plan.hi() + 60;
   builder.quad(vec3(-edge, 0, edge), vec3(2 * edge, 0, 0), vec3(0, 0, -2 * edge));
