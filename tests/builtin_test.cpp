@@ -173,6 +173,7 @@ TEST_P(EveryBuiltin, MovesExactlyWhenItSaysSo) {
     moved |= a.instances[i].to_world != b.instances[i].to_world;
   for (std::size_t i = 0; i < a.lights.size(); ++i)
     moved |= a.lights[i].position != b.lights[i].position || a.lights[i].direction != b.lights[i].direction;
+  for (std::size_t i = 0; i < a.cameras.size(); ++i) moved |= a.cameras[i].position != b.cameras[i].position;
   EXPECT_EQ(moved, info_of(GetParam()).animated);
 }
 
