@@ -186,10 +186,13 @@ CameraInstance default_camera(const SceneState& state);
 // (.gltf .glb by tinygltf; .obj .ply .fbx and what else Assimp reads except glTF).
 Scene load_scene(const std::string& name_or_path);
 
-// Exporters write to a temporary beside `file` and rename.
-void export_gltf(const Scene& scene, const std::filesystem::path& file);  // .glb or .gltf (embedded data)
-void export_pbrt(const Scene& scene, double seconds, int camera, int width, int height, int spp,
-                 const std::filesystem::path& file);  // pbrt-v4, PLY meshes beside it
+// Exporters write to a temporary beside `file` and rename; they expect a validated scene. They return one sentence for
+// each thing that the format cannot hold exactly.
+std::vector<std::string> export_gltf(const Scene& scene, const std::filesystem::path& file);  // .glb, .gltf (embedded)
+// pbrt-v4 at one moment, seen by camera `camera` of evaluate()'s list (-1: the default view); meshes and textures go
+// to files named after `file` beside it.
+std::vector<std::string> export_pbrt(const Scene& scene, double seconds, int camera, int width, int height, int spp,
+                                     const std::filesystem::path& file);
 
 struct SceneParameter {
   std::string name, default_value, description;
