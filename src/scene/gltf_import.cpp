@@ -64,6 +64,17 @@ vec2 pair(const tinygltf::Value& object, const char* key, vec2 absent) {
   if (array.ArrayLen() != 2 || !array.Get(0).IsNumber() || !array.Get(1).IsNumber()) return absent;
   return vec2(glm::dvec2(array.Get(0).GetNumberAsDouble(), array.Get(1).GetNumberAsDouble()));
 }
+std::optional<vec3> triple(const tinygltf::Value& object, const char* key) {
+  if (!object.Has(key)) return std::nullopt;
+  const tinygltf::Value& array = object.Get(key);
+  if (array.ArrayLen() != 3) return std::nullopt;
+  glm::dvec3 v(0);
+  for (int i = 0; i < 3; ++i) {
+    if (!array.Get(i).IsNumber()) return std::nullopt;
+    v[i] = array.Get(i).GetNumberAsDouble();
+  }
+  return vec3(v);
+}
 int integer(const tinygltf::Value& object, const char* key, int absent) {
   return object.Has(key) && object.Get(key).IsInt() ? object.Get(key).GetNumberAsInt() : absent;
 }
@@ -103,6 +114,7 @@ class Importer {
     import_cameras();
     import_nodes();
     for (const tinygltf::Animation& animation : file_.model.animations) import_animation(animation);
+    import_environment();
     for (const std::string& warning : once_)
       scene_.warnings.push_back(fmt::format("{}: {}", file_.name, warning));
     validate(scene_);
@@ -433,6 +445,25 @@ class Importer {
     channel.times = read_floats(file_, sampler.input, 1, user + " input");
     channel.values = to_vec4(read_floats(file_, sampler.output, components, user + " output"), components, 0);
     return channel;
+  }
+
+  // --- what our own exporter adds ---
+
+  // Environment light has no ratified extension; export_gltf keeps it in `extras` of the scene.
+  void import_environment() {
+    if (file_.model.scenes.empty()) return;
+    const tinygltf::Value& extras =
+        element(file_.model.scenes, std::max(file_.model.defaultScene, 0), "scene", "the asset").extras;
+    if (!extras.IsObject() || !extras.Has("lumigrove_environment")) return;
+    const tinygltf::Value& source = extras.Get("lumigrove_environment");
+    const std::optional<vec3> radiance = triple(source, "radiance");
+    if (!radiance) fail("lumigrove_environment has no radiance of three numbers");
+    scene_.environment.radiance = *radiance;
+    if (!source.Has("image")) return;
+    const int view = integer(source.Get("image"), "bufferView", -1);
+    scene_.environment.image = static_cast<int>(scene_.images.size());
+    scene_.images.push_back(decode_image(view_bytes(file_, view), file_.name + ": environment.exr", false));
+    scene_.images.back().name = "environment";
   }
 
   GltfFile file_;
