@@ -183,16 +183,17 @@ CameraInstance default_camera(const SceneState& state);
 // Every function here throws Error with one sentence naming the file or parameter at fault.
 
 // Dispatches: a built-in name ("night-city", "night-city?lights=50000&seed=3") or a file by its extension
-// (.gltf .glb by tinygltf; .obj .ply .fbx and what else Assimp reads except glTF).
+// (.gltf .glb by tinygltf; .obj .ply .fbx .stl .dae and some others by Assimp).
 Scene load_scene(const std::string& name_or_path);
 
 // Exporters write to a temporary beside `file` and rename; they expect a validated scene. They return one sentence for
 // each thing that the format cannot hold exactly.
 std::vector<std::string> export_gltf(const Scene& scene, const std::filesystem::path& file);  // .glb, .gltf (embedded)
-// pbrt-v4 at one moment, seen by camera `camera` of evaluate()'s list (-1: the default view); meshes and textures go
-// to files named after `file` beside it.
+// pbrt-v4 at one moment, seen by camera `camera` of evaluate()'s list (-1: the default view), `width` x `height` pixels;
+// meshes and textures go to the folder <stem>_files beside `file`. pbrt's materials equal ours only for diffuse surfaces:
+// `force_diffuse` writes every material so, for comparisons with Settings::force_diffuse.
 std::vector<std::string> export_pbrt(const Scene& scene, double seconds, int camera, int width, int height, int spp,
-                                     const std::filesystem::path& file);
+                                     const std::filesystem::path& file, bool force_diffuse = false);
 
 struct SceneParameter {
   std::string name, default_value, description;
