@@ -25,7 +25,7 @@ std::shared_ptr<LogOptions> add_log_options(CLI::App& command) {
   auto options = std::make_shared<LogOptions>();
   auto* quiet = command.add_flag("-q,--quiet", options->quiet, "Say nothing but errors");
   auto* verbose = command.add_flag("-v", options->verbosity, "Say more; -vv for even more")->excludes(quiet);
-  command.add_option("--log-level", options->level, "Least level of messages on stderr (default: warning)")
+  command.add_option("--log-level", options->level, "Least level of messages on stderr (default warning)")
       ->transform(CLI::IsMember(kLevels))
       ->excludes(quiet)
       ->excludes(verbose);

@@ -15,7 +15,7 @@ namespace {
 constexpr double kBarInterval = 0.1;    // s between redraws
 constexpr double kPlainInterval = 5.0;  // s between lines
 constexpr double kJsonInterval = 0.5;
-constexpr int kBarWidth = 24;           // characters
+constexpr int kBarWidth = 24;  // characters
 
 bool stderr_is_terminal() {
   const char* terminal = std::getenv("TERM");
@@ -35,6 +35,11 @@ std::string clock_text(double seconds) {
 
 double remaining(double done, double elapsed) { return done > 0 ? elapsed * (1 - done) / done : 0; }
 
+// ", 0:12 left", or nothing at the end.
+std::string left_text(double done, double elapsed) {
+  return done < 1 ? fmt::format(", {} left", clock_text(remaining(done, elapsed))) : std::string();
+}
+
 }  // namespace
 
 ProgressStyle progress_style(const std::string& name) {
@@ -49,8 +54,11 @@ ProgressStyle progress_style(const std::string& name) {
 ProgressPrinter::ProgressPrinter(ProgressStyle style, int frame_count)
     : style_(style), frame_count_(frame_count) {}
 
-ProgressPrinter::~ProgressPrinter() {
+ProgressPrinter::~ProgressPrinter() { end_line(); }
+
+void ProgressPrinter::end_line() {
   if (bar_length_ > 0) std::fputs("\n", stderr);
+  bar_length_ = 0;
 }
 
 void ProgressPrinter::begin_frame(int frame) {
@@ -61,7 +69,8 @@ void ProgressPrinter::begin_frame(int frame) {
 void ProgressPrinter::update(const Progress& progress) {
   if (style_ == ProgressStyle::kNone) return;
   const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
-  const double in_frame = progress.spp_total > 0 ? static_cast<double>(progress.spp_done) / progress.spp_total : 1;
+  const double in_frame =
+      progress.spp_total > 0 ? static_cast<double>(progress.spp_done) / progress.spp_total : 1;
   const double done = (frames_begun_ - 1 + in_frame) / frame_count_;
   const bool last = progress.spp_done >= progress.spp_total && frames_begun_ == frame_count_;
   const double since = last_shown_ < 0 && style_ == ProgressStyle::kPlain ? elapsed : elapsed - last_shown_;
@@ -70,21 +79,22 @@ void ProgressPrinter::update(const Progress& progress) {
   last_shown_ = elapsed;
 
   std::string counts = fmt::format("{}/{} spp", progress.spp_done, progress.spp_total);
-  if (frame_count_ > 1) counts = fmt::format("frame {} ({}/{}), {}", frame_, frames_begun_, frame_count_, counts);
+  if (frame_count_ > 1)
+    counts = fmt::format("frame {} ({}/{}), {}", frame_, frames_begun_, frame_count_, counts);
   if (style_ == ProgressStyle::kBar)
     draw_bar(done, elapsed, counts);
   else if (style_ == ProgressStyle::kJson)
     print_json(progress, done, elapsed);
   else
-    fmt::print(stderr, "{:3.0f}%  {}, {} elapsed, {} left\n", 100 * done, counts, clock_text(elapsed),
-               clock_text(remaining(done, elapsed)));
+    fmt::print(stderr, "{:3.0f}%  {}, {} elapsed{}\n", 100 * done, counts, clock_text(elapsed),
+               left_text(done, elapsed));
 }
 
 void ProgressPrinter::draw_bar(double done, double elapsed, const std::string& counts) {
   const int filled = static_cast<int>(done * kBarWidth);
-  std::string line = fmt::format("[{}{}] {:3.0f}%  {}, {} left", std::string(filled, '#'),
-                                 std::string(kBarWidth - filled, '-'), 100 * done, counts,
-                                 clock_text(remaining(done, elapsed)));
+  std::string line =
+      fmt::format("[{}{}] {:3.0f}%  {}{}", std::string(filled, '#'), std::string(kBarWidth - filled, '-'),
+                  100 * done, counts, left_text(done, elapsed));
   const std::size_t length = line.size();
   if (length < bar_length_) line.append(bar_length_ - length, ' ');  // over the rest of a longer line
   bar_length_ = length;

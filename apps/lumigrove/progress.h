@@ -23,8 +23,9 @@ class ProgressPrinter {
   ProgressPrinter(ProgressStyle style, int frame_count);
   ~ProgressPrinter();  // ends the bar's line
 
-  void begin_frame(int frame);             // number of the frame that comes next
-  void update(const Progress& progress);   // of this frame
+  void begin_frame(int frame);            // number of the frame that comes next
+  void update(const Progress& progress);  // of this frame
+  void end_line();                        // so that something else can be printed
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -35,8 +36,8 @@ class ProgressPrinter {
   ProgressStyle style_;
   int frame_count_, frame_ = 0, frames_begun_ = 0;
   Clock::time_point start_ = Clock::now();
-  double last_shown_ = -1;                 // seconds after start, -1 never
-  std::size_t bar_length_ = 0;             // characters on the terminal's line
+  double last_shown_ = -1;      // seconds after start, -1 never
+  std::size_t bar_length_ = 0;  // characters on the terminal's line
 };
 
 }  // namespace lumigrove

@@ -15,9 +15,10 @@ namespace {
 constexpr int kMaxFrames = 1000000;
 
 [[noreturn]] void refuse_frames(const std::string& text) {
-  throw Error(fmt::format("--frames is '{}', but must be A, A-B or A-BxS with whole numbers A <= B and S >= 1, "
-                          "at most {} frames",
-                          text, kMaxFrames));
+  throw Error(
+      fmt::format("--frames is '{}', but must be A, A-B or A-BxS with whole numbers A <= B and S >= 1, "
+                  "at most {} frames",
+                  text, kMaxFrames));
 }
 
 int number(const std::string& digits, const std::string& text) {
@@ -43,14 +44,15 @@ std::vector<int> parse_frames(const std::string& text) {
 }
 
 std::string frame_file(const std::string& pattern, int frame) {
-  static const std::regex kPlace("#+|%(?:0?[1-9])?d");
+  static const std::regex kPlace("#+|%(?:0[1-9])?d");
   const std::filesystem::path path(pattern);
   const std::string name = path.filename().string();  // folders may contain anything
   std::smatch match;
   if (!std::regex_search(name, match, kPlace)) {
     if (name.find('%') != std::string::npos)
       throw Error(fmt::format("output '{}': only %d and %0Nd stand for the frame number", pattern));
-    const std::string numbered = fmt::format("{}.{:04}{}", path.stem().string(), frame, path.extension().string());
+    const std::string numbered =
+        fmt::format("{}.{:04}{}", path.stem().string(), frame, path.extension().string());
     return (path.parent_path() / numbered).string();
   }
   if (match.suffix().str().find_first_of("#%") != std::string::npos ||

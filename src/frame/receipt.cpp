@@ -50,19 +50,21 @@ std::string version_text() {
   return revision.empty() ? version() : fmt::format("{} ({})", version(), revision);
 }
 
-Receipt make_receipt(const Scene& scene, const std::string& scene_name, const Settings& settings,
-                     const RenderStats& stats) {
+Receipt make_receipt(const Scene& scene, const std::string& scene_name) {
   Receipt receipt;
   receipt.version = version_text();
   receipt.scene = scene_name;
   if (!is_builtin_scene(scene_name)) receipt.scene_file = std::filesystem::absolute(scene_name).string();
   receipt.scene_hash = content_hash(scene);
+  return receipt;
+}
+
+void complete_receipt(Receipt& receipt, const Settings& settings, const RenderStats& stats) {
   receipt.settings = settings;
   receipt.spp_done = stats.spp_done;
   const auto cores = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   receipt.threads = settings.threads > 0 ? settings.threads : cores;
   receipt.stats = stats;
-  return receipt;
 }
 
 void write_receipt(const Receipt& receipt, std::map<std::string, std::string>& metadata) {

@@ -24,9 +24,12 @@ struct Receipt {
 // version() and commit() as one text.
 std::string version_text();
 
-// Receipt of a render of `scene`, which was loaded as `scene_name`.
-Receipt make_receipt(const Scene& scene, const std::string& scene_name, const Settings& settings,
-                     const RenderStats& stats);
+// Receipt of any render of `scene`, which was loaded as `scene_name`: hashes the scene, so make it once for a
+// sequence.
+Receipt make_receipt(const Scene& scene, const std::string& scene_name);
+
+// Adds what one render was asked and what it did.
+void complete_receipt(Receipt& receipt, const Settings& settings, const RenderStats& stats);
 
 // Adds the receipt to `metadata`. Only the key "timings" differs between equal renders.
 void write_receipt(const Receipt& receipt, std::map<std::string, std::string>& metadata);

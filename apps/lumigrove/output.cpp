@@ -1,0 +1,71 @@
+#include "output.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+
+#include "base/atomic_file.h"
+
+namespace lumigrove {
+namespace {
+
+namespace fs = std::filesystem;
+
+void require_extension(const fs::path& file, const std::vector<std::string>& extensions) {
+  std::string extension = file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
+    throw Error(fmt::format("output '{}' must end in one of {}", file.string(), fmt::join(extensions, ", ")));
+}
+
+void require_creatable(const fs::path& file) {
+  const fs::path probe = temporary_beside(file);
+  const bool created = std::ofstream(probe).good();
+  std::error_code ignored;
+  fs::remove(probe, ignored);
+  if (!created)
+    throw Error(fmt::format("output '{}' cannot be written: its folder is not writable", file.string()));
+}
+
+}  // namespace
+
+const std::vector<std::string> kImageExtensions = {".exr", ".png", ".jpg", ".jpeg"};
+
+ToneMap OutputOptions::tone() const {
+  return {exposure, curve == "srgb" ? ToneCurve::kSrgb : ToneCurve::kFilmic};
+}
+
+std::shared_ptr<OutputOptions> add_output_options(CLI::App& command) {
+  auto options = std::make_shared<OutputOptions>();
+  command
+      .add_option("-o,--output,--outfile", options->files,
+                  "Image to write: .exr (all layers, linear), .png or .jpg (tone-mapped); may be repeated")
+      ->allow_extra_args(false)
+      ->type_name("FILE");
+  command
+      .add_option("--exposure", options->exposure, "Exposure of .png and .jpg (EV, default 0; +1 doubles)")
+      ->type_name("EV")
+      ->check(CLI::Range(-100.0, 100.0));
+  command.add_option("--tone", options->curve, "Tone curve of .png and .jpg (default filmic)")
+      ->check(CLI::IsMember({"filmic", "srgb"}));
+  return options;
+}
+
+void require_writable(const std::string& name, const std::vector<std::string>& extensions) {
+  const fs::path file(name);
+  require_extension(file, extensions);
+  std::error_code ignored;
+  const fs::file_status status = fs::status(file, ignored);
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    throw Error(fmt::format("output '{}' is not a regular file", name));
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, ignored))
+    throw Error(fmt::format("output '{}' cannot be written: there is no folder '{}'", name, folder.string()));
+  require_creatable(file);
+}
+
+}  // namespace lumigrove

@@ -1,0 +1,31 @@
+// Image files of a command: refused before any work is done, written when it is.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lumigrove/image.h"
+
+namespace lumigrove {
+
+struct OutputOptions {
+  std::vector<std::string> files;
+  float exposure = 0;  // EV
+  std::string curve = "filmic";
+
+  ToneMap tone() const;
+};
+
+// -o, --exposure, --tone. The caller says whether -o is required.
+std::shared_ptr<OutputOptions> add_output_options(CLI::App& command);
+
+// Extensions that write_image knows.
+extern const std::vector<std::string> kImageExtensions;
+
+// Throws Error unless `file` has one of `extensions` and lies in an existing, writable folder, and unless it
+// is a regular file if it exists already.
+void require_writable(const std::string& file, const std::vector<std::string>& extensions = kImageExtensions);
+
+}  // namespace lumigrove

@@ -1,0 +1,23 @@
+// SCENE, -D and --environment.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace lumigrove {
+
+struct SceneOptions {
+  std::string name;
+  std::vector<std::string> definitions;  // key=value
+  std::string environment;
+
+  // The built-in scene's name with the definitions as its parameters. Throws Error when a file gets
+  // definitions.
+  std::string full_name() const;
+};
+
+std::shared_ptr<SceneOptions> add_scene_options(CLI::App& command);
+
+}  // namespace lumigrove
