@@ -21,4 +21,7 @@ std::filesystem::path resolve_inside(const std::filesystem::path& folder, const 
 // "%20" -> " "; throws Error "<where>: ..." for a malformed escape.
 std::string percent_decode(const std::string& text, const std::string& where);
 
+// ".obj" of "Chair.OBJ"; empty without an extension.
+std::string lower_case_extension(const std::filesystem::path& file);
+
 }  // namespace lumigrove

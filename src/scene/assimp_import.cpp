@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
 #include <map>
+#include <sstream>
 
 #include "base/guarded_call.h"
 #include "scene/asset_files.h"
@@ -20,7 +22,7 @@ void check_file(const fs::path& file) {
   std::error_code error;
   if (!fs::exists(file, error)) throw Error(fmt::format("{}: no such file", file.string()));
   if (!fs::is_regular_file(file, error)) throw Error(fmt::format("{}: not a regular file", file.string()));
-  const std::string extension = file.extension().string();
+  const std::string extension = lower_case_extension(file);
   if (!assimp_reads(extension))
     throw Error(fmt::format("{}: scenes of type '{}' cannot be read (supported: .gltf, .glb, {})",
                             file.string(), extension, assimp_extensions()));
@@ -28,12 +30,36 @@ void check_file(const fs::path& file) {
     throw Error(fmt::format("{}: the file is empty", file.string()));
 }
 
+// Assimp 5.2 waits for ever for the end of an unfinished PLY header and believes every element count in it.
+void check_ply(const fs::path& file) {
+  constexpr std::size_t kLongestHeader = 1 << 16;
+  std::string header(kLongestHeader, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(header.data(), static_cast<std::streamsize>(header.size()));
+  header.resize(static_cast<std::size_t>(stream.gcount()));
+  std::istringstream lines(header);
+  double elements = 0;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string keyword, name;
+    double count = 0;
+    words >> keyword;
+    if (keyword == "end_header") {
+      if (elements <= static_cast<double>(fs::file_size(file))) return;
+      throw Error(fmt::format("{}: the header promises {} elements, more than the file can hold",
+                              file.string(), elements));
+    }
+    if (keyword == "element" && words >> name >> count) elements += count;
+  }
+  throw Error(fmt::format("{}: the PLY header has no end", file.string()));
+}
+
 // Far more than a sound file needs: Assimp parses some 10 MB a second into some 20 times the memory.
 GuardLimits limits_for(const fs::path& file) {
   const double megabytes = static_cast<double>(fs::file_size(file)) * 1e-6;
   GuardLimits limits;
-  limits.cpu_seconds = 20 + 2 * megabytes;
-  limits.memory_bytes = (std::size_t{4} << 30) + static_cast<std::size_t>(200e6 * megabytes);
+  limits.cpu_seconds = 10 + 2 * megabytes;
+  limits.memory_bytes = (std::size_t{1} << 30) + static_cast<std::size_t>(200e6 * megabytes);
   return limits;
 }
 
@@ -172,6 +198,7 @@ Image8or32 TextureLoader::load(const ForeignTexture& texture) {
 
 Scene import_assimp(const fs::path& file) {
   check_file(file);
+  if (lower_case_extension(file) == ".ply") check_ply(file);
   const std::vector<std::uint8_t> bytes =
       call_guarded(file.string() + ": Assimp, reading it,", limits_for(file), [&] {
         ForeignScene foreign = read_with_assimp(file);

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -31,12 +30,6 @@ constexpr std::array<std::string_view, 13> kExtensions = {
 // Meshes become indexed triangles; v grows downwards; texture transforms go into the coordinates.
 constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_JoinIdenticalVertices | aiProcess_SortByPType |
                             aiProcess_FlipUVs | aiProcess_TransformUVCoords;
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 vec3 to_vec3(const aiVector3D& v) { return vec3(v.x, v.y, v.z); }
 vec3 to_vec3(const aiColor3D& c) { return vec3(c.r, c.g, c.b); }
@@ -90,7 +83,7 @@ class FolderFiles : public Assimp::DefaultIOSystem {
 class Converter {
  public:
   Converter(const aiScene& source, const fs::path& file)
-      : source_(source), name_(file.string()), extension_(lower_case(file.extension().string())) {}
+      : source_(source), name_(file.string()), extension_(lower_case_extension(file)) {}
 
   ForeignScene convert();
 
@@ -515,8 +508,7 @@ std::string reason(const Assimp::Importer& importer) {
 }  // namespace
 
 bool assimp_reads(const std::string& extension) {
-  const std::string lower = lower_case(extension);
-  return std::find(kExtensions.begin(), kExtensions.end(), lower) != kExtensions.end();
+  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
 std::string assimp_extensions() { return fmt::format("{}", fmt::join(kExtensions, ", ")); }
@@ -532,7 +524,7 @@ ForeignScene read_with_assimp(const fs::path& file) {
   if (!source) throw Error(fmt::format("{}: cannot be read: {}", file.string(), reason(importer)));
   ForeignScene foreign = Converter(*source, file).convert();
   for (const std::string& path : missing)
-    if (lower_case(fs::path(path).extension().string()) == ".mtl")
+    if (lower_case_extension(path) == ".mtl")
       foreign.scene.warnings.push_back(fmt::format("{}: the material library '{}' does not exist",
                                                    file.string(), fs::path(path).filename().string()));
   return foreign;

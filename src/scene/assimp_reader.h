@@ -38,7 +38,7 @@ struct ForeignScene {
 // file.
 ForeignScene read_with_assimp(const std::filesystem::path& file);
 
-// True for extensions (".obj", any case) of the formats that are read through Assimp. Assimp knows more;
+// True for extensions (".obj", lower case) of the formats that are read through Assimp. Assimp knows more;
 // these are in use, describe whole scenes or meshes, and its importers for them return sound data.
 bool assimp_reads(const std::string& extension);
 

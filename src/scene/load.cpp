@@ -1,19 +1,10 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
-
+#include "scene/asset_files.h"
 #include "scene/import.h"
 
 namespace lumigrove {
 namespace {
-
-std::string lower_case_extension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 std::string builtin_names() {
   std::string names;
