@@ -30,13 +30,15 @@ struct Pixel {
 // band and the last block of a band may be smaller), pixels row by row inside a block. Every pixel of the
 // window comes once.
 LUMI_HD inline Pixel pixel_of_index(const PixelWindow& window, int index) {
-  const int band = index / (kPixelBlock * window.width());
-  const int in_band = index - band * kPixelBlock * window.width();
+  const int band_size = kPixelBlock * window.width();
+  const int band = index / band_size, in_band = index - band * band_size;
   const int rows = glm::min(kPixelBlock, window.height() - band * kPixelBlock);
-  const int block = in_band / (kPixelBlock * rows);
+  // Dividing by the constant, which is a shift, in the whole blocks that make up nearly all of an image.
+  const int block =
+      rows == kPixelBlock ? in_band / (kPixelBlock * kPixelBlock) : in_band / (kPixelBlock * rows);
   const int in_block = in_band - block * kPixelBlock * rows;
   const int columns = glm::min(kPixelBlock, window.width() - block * kPixelBlock);
-  const int row = in_block / columns;
+  const int row = columns == kPixelBlock ? in_block / kPixelBlock : in_block / columns;
   return {window.x0 + block * kPixelBlock + in_block - row * columns, window.y0 + band * kPixelBlock + row};
 }
 
@@ -65,16 +67,21 @@ inline CameraView make_camera_view(const CameraInstance& camera, int width, int 
 }
 
 // Ray through `at` (in pixels from the top left corner of the image); unit direction; starts at the near
-// plane.
-LUMI_HD inline Ray camera_ray(const CameraView& camera, vec2 at) {
+// plane. Writes member by member into memory: copying a whole Ray that was just put together waits for its
+// parts.
+LUMI_HD inline void write_camera_ray(const CameraView& camera, vec2 at, Ray& ray) {
   const vec2 p = camera.corner + at * camera.pixel_size;
   const vec3 d = camera.forward + camera.right * p.x + camera.down * p.y;
   const float length = glm::sqrt(length_squared(d));
-  Ray ray;
   ray.origin = camera.position;
-  ray.direction = d * (1.0f / length);
   ray.tmin = camera.znear * length;
+  ray.direction = d * (1.0f / length);
   ray.tmax = kInfinity;
+}
+
+LUMI_HD inline Ray camera_ray(const CameraView& camera, vec2 at) {
+  Ray ray;
+  write_camera_ray(camera, at, ray);
   return ray;
 }
 
@@ -97,7 +104,7 @@ struct CameraKernel {
     vec2 offset(0.5f);
     if (jitter) offset = vec2(Rng{seed, frame, rng_pixel(camera, pixel)}.uniform4(kDimPixel));
     const vec2 at = vec2(static_cast<float>(pixel.x), static_cast<float>(pixel.y)) + offset;
-    rays[static_cast<std::size_t>(i)] = camera_ray(camera, at);
+    write_camera_ray(camera, at, rays[static_cast<std::size_t>(i)]);
   }
 };
 

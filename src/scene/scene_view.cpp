@@ -40,6 +40,8 @@ MaterialView make_view(const Material& material) {
   view.metallic_roughness_texture = material.metallic_roughness_texture;
   view.normal_texture = material.normal_texture;
   view.emissive_texture = material.emissive_texture;
+  view.textured = view.base_color_texture.image >= 0 || view.metallic_roughness_texture.image >= 0 ||
+                  view.normal_texture.image >= 0 || view.emissive_texture.image >= 0;
   return view;
 }
 

@@ -23,6 +23,7 @@ struct MaterialView {
   vec3 emission;
   float normal_scale, alpha_cutoff;
   bool masked, double_sided;
+  bool textured;  // any of the four below has an image
   TextureUse base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture;
 };
 
@@ -41,8 +42,9 @@ struct MeshView {
 
 struct InstanceView {
   mat4x3 to_world;
-  mat3 normal_to_world;   // flip * cofactors: outward normals stay outward also under mirroring; not unit length
-  float flip;             // -1 when to_world mirrors: the front is on the side of flip * cross(p1-p0, p2-p0), world
+  mat3 normal_to_world;  // flip * cofactors: outward normals stay outward also under mirroring; not unit
+                         // length
+  float flip;  // -1 when to_world mirrors: the front is on the side of flip * cross(p1-p0, p2-p0), world
   int mesh;
 };
 

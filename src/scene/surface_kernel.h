@@ -96,14 +96,24 @@ LUMI_HD inline vec3 face_viewer(vec3 n, vec3 geometric, vec3 wo) {
   return normalize_or(glm::mix(n, geometric, (want - have) / (most - have)), geometric);
 }
 
-LUMI_HD inline Surface make_surface(const SceneView& scene, const Ray& ray, const Hit& hit,
-                                    bool force_diffuse) {
-  Surface s;
-  const float length = glm::length(ray.direction);
-  s.wo = normalize_or(-ray.direction, vec3(0, 0, 1));
-  s.position = s.diffuse = s.specular = s.emission = vec3(0);
-  s.geometric_normal = s.normal = s.wo;
-  if (hit.instance == kNone) return s;
+// Writes straight into `s`: a kernel's output is 144 bytes that need not be put together elsewhere first.
+LUMI_HD inline void write_surface(const SceneView& scene, const Ray& ray, const Hit& hit, bool force_diffuse,
+                                  Surface& s) {
+  const float squared = length_squared(ray.direction);
+  const float inverse = squared > 0.0f ? 1.0f / glm::sqrt(squared) : 0.0f;
+  s.wo = ray.direction * -inverse;
+  s.emitter = kNone;
+  s.emission = vec3(0);
+  s.pad = 0;
+  if (hit.instance == kNone) {
+    s.position = s.diffuse = s.specular = vec3(0);
+    s.geometric_normal = s.normal = s.wo;
+    s.t = s.epsilon = 0;
+    s.roughness = 1;
+    s.instance = kNone;
+    s.triangle = 0;
+    return;
+  }
 
   const InstanceView& instance = scene.instances[hit.instance];
   const MeshView& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh)];
@@ -112,14 +122,15 @@ LUMI_HD inline Surface make_surface(const SceneView& scene, const Ray& ray, cons
   const WorldTriangle world = world_triangle(mesh, instance, triangle);
   s.instance = hit.instance;
   s.triangle = hit.triangle;
-  s.t = hit.t * length;
+  s.t = hit.t * squared * inverse;
   s.position = world.p0 + world.e1 * hit.u + world.e2 * hit.v;
   s.epsilon = self_intersection_offset(world);
 
   const vec3 front = normalize_or(glm::cross(world.e1, world.e2) * instance.flip, s.wo);
   const bool front_seen = glm::dot(front, s.wo) >= 0.0f;
   s.geometric_normal = front_seen ? front : -front;
-  const TexturePoint at = texture_point(mesh, triangle, hit.u, hit.v);
+  TexturePoint at;
+  if (material.textured) at = texture_point(mesh, triangle, hit.u, hit.v);
   vec3 n = front;
   if (mesh.normals) {
     n = normalize_or(instance.normal_to_world * interpolate(mesh.normals, triangle, hit.u, hit.v), front);
@@ -146,6 +157,12 @@ LUMI_HD inline Surface make_surface(const SceneView& scene, const Ray& ray, cons
       s.emission *= vec3(sample_texture(scene, material.emissive_texture, at.uv0, at.uv1));
     }
   }
+}
+
+LUMI_HD inline Surface make_surface(const SceneView& scene, const Ray& ray, const Hit& hit,
+                                    bool force_diffuse) {
+  Surface s;
+  write_surface(scene, ray, hit, force_diffuse, s);
   return s;
 }
 
@@ -159,7 +176,7 @@ struct SurfaceKernel {
 
   LUMI_HD void operator()(int i) const {
     const auto at = static_cast<std::size_t>(i);
-    surfaces[at] = make_surface(scene, rays[at], hits[at], force_diffuse);
+    write_surface(scene, rays[at], hits[at], force_diffuse, surfaces[at]);
   }
 };
 
