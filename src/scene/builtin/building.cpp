@@ -20,10 +20,10 @@ mat4 wall_frame(const Facade& wall) {
 
 std::array<Facade, 4> walls_of(const BuildingShape& s) {
   const float w = s.hi.x - s.lo.x, d = s.hi.y - s.lo.y, h = s.height();
-  return {Facade{vec3(s.lo.x, s.base, s.hi.y), vec3(1, 0, 0), vec3(0, 0, 1), w, h},
-          Facade{vec3(s.hi.x, s.base, s.hi.y), vec3(0, 0, -1), vec3(1, 0, 0), d, h},
-          Facade{vec3(s.hi.x, s.base, s.lo.y), vec3(-1, 0, 0), vec3(0, 0, -1), w, h},
-          Facade{vec3(s.lo.x, s.base, s.lo.y), vec3(0, 0, 1), vec3(-1, 0, 0), d, h}};
+  return {Facade{vec3(s.lo.x, s.base, s.hi.y), vec3(1, 0, 0), vec3(0, 0, 1), kFront, w, h},
+          Facade{vec3(s.hi.x, s.base, s.hi.y), vec3(0, 0, -1), vec3(1, 0, 0), kRight, d, h},
+          Facade{vec3(s.hi.x, s.base, s.lo.y), vec3(-1, 0, 0), vec3(0, 0, -1), kBack, w, h},
+          Facade{vec3(s.lo.x, s.base, s.lo.y), vec3(0, 0, 1), vec3(-1, 0, 0), kLeft, d, h}};
 }
 
 void add_relief(const BuildingShape& shape, const Facade& wall, int bays, MeshBuilder& builder) {
@@ -50,13 +50,15 @@ void add_windows(const BuildingShape& shape, const Facade& wall, int bays, std::
   const auto add = [&](int column, float bottom, vec2 size, float weight, bool shop) {
     const float left = bay * static_cast<float>(column) + 0.5f * (bay - size.x);
     windows.push_back({wall.origin + wall.along * left + vec3(0, bottom, 0) + wall.normal * kPaneOffset,
-                       wall.along * size.x, vec3(0, size.y, 0), weight, shop});
+                       wall.along * size.x, vec3(0, size.y, 0), weight, shop ? 2 : shape.panes_across,
+                       shop ? 1 : shape.panes_down, shop});
   };
   for (int column = 0; column < bays; ++column) {
-    if (shape.shops) add(column, 0.6f, vec2(bay - 0.7f, shape.ground_floor - 1.5f), 2.5f, true);
+    if (shape.shops) add(column, 0.6f, vec2(bay - 0.7f, shape.ground_floor - 1.5f), 1.5f, true);
     for (int f = 1; f < shape.floors; ++f) {
-      const float bottom = shape.ground_floor + shape.floor_height * static_cast<float>(f - 1) + 0.85f;
-      add(column, bottom, vec2(bay - 1.2f, shape.floor_height - 1.45f), shape.weight, false);
+      const float bottom =
+          shape.ground_floor + shape.floor_height * static_cast<float>(f - 1) + 0.6f * shape.margin.y;
+      add(column, bottom, vec2(bay, shape.floor_height) - shape.margin, shape.weight, false);
     }
   }
 }
@@ -70,22 +72,39 @@ void add_building(const BuildingShape& shape, MeshBuilder& walls, std::vector<Wi
             kSides | kTop);
   for (const Facade& wall : walls_of(shape)) {
     const int bays = std::max(1, static_cast<int>(std::lround(wall.width / shape.bay)));
+    if (!(shape.windowed & wall.side)) continue;
     add_relief(shape, wall, bays, walls);
     add_windows(shape, wall, bays, windows);
     facades.push_back(wall);
   }
 }
 
-std::vector<bool> choose_lit(const std::vector<WindowSlot>& windows, std::size_t count, std::uint32_t seed) {
+std::vector<bool> choose_lit(const std::vector<WindowSlot>& windows, std::size_t triangles,
+                             std::uint32_t seed) {
   std::vector<std::pair<float, std::uint32_t>> order;
   order.reserve(windows.size());
   for (std::uint32_t i = 0; i < windows.size(); ++i)
     order.emplace_back(RandomStream(seed, kLitPurpose, i).uniform() / windows[i].weight, i);
-  count = std::min(count, order.size());
-  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count), order.end());
+  std::sort(order.begin(), order.end());
   std::vector<bool> lit(windows.size(), false);
-  for (std::size_t k = 0; k < count; ++k) lit[order[k].second] = true;
+  std::size_t placed = 0;
+  for (const auto& [key, i] : order) {
+    if (placed + windows[i].triangles() > triangles) break;
+    placed += windows[i].triangles();
+    lit[i] = true;
+  }
   return lit;
+}
+
+void add_panes(MeshBuilder& builder, const WindowSlot& window, float bar) {
+  const float width = glm::length(window.u), height = glm::length(window.v);
+  const vec3 right = window.u / width, up = window.v / height;
+  const float w = (width + bar) / static_cast<float>(window.across),
+              h = (height + bar) / static_cast<float>(window.down);
+  for (int row = 0; row < window.down; ++row)
+    for (int column = 0; column < window.across; ++column)
+      builder.quad(window.corner + w * static_cast<float>(column) * right + h * static_cast<float>(row) * up,
+                   (w - bar) * right, (h - bar) * up);
 }
 
 }  // namespace lumigrove::builtin

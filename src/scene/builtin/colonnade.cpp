@@ -130,7 +130,7 @@ void add_arcades(Scene& scene, const Materials& m, int bays) {
 // Floors, aisle ceilings, outer walls and end walls.
 void add_shell(Scene& scene, const Materials& m, int bays) {
   const float half = 0.5f * kBay * static_cast<float>(bays), depth = kHalfCourt + kWall + kAisle;
-  MeshBuilder floor, plaster, brick, trim;
+  MeshBuilder floor, plaster, brick, trim, door;
   floor.quad(vec3(-half, 0, depth), vec3(2 * half, 0, 0), vec3(0, 0, -2 * depth));
   for (const float side : {-1.0f, 1.0f}) {
     const float inner = side * kHalfCourt, outer = side * depth;
@@ -156,6 +156,14 @@ void add_shell(Scene& scene, const Materials& m, int bays) {
     brick.box(vec3(-half - kWall, 0, wall_lo), vec3(half + kWall, kRoof + 1.2f, wall_hi));
     brick.box(vec3(side > 0 ? half : -half - kWall, 0, -depth),
               vec3(side > 0 ? half + kWall : -half, kRoof + 1.2f, depth));
+    // The mouldings go on along the end walls, where a door leads out.
+    const float end_lo = side > 0 ? half - 0.15f : -half, end_hi = side > 0 ? half : -half + 0.15f;
+    for (const float y : {kArchTop, kRoof})
+      trim.box(vec3(end_lo, y - 0.05f, -kHalfCourt), vec3(end_hi, y + kSlab + 0.05f, kHalfCourt));
+    for (const float z : {-1.5f, 1.2f}) trim.box(vec3(end_lo, 0, z), vec3(end_hi, 3.6f, z + 0.3f));
+    trim.box(vec3(end_lo, 3.6f, -1.7f), vec3(end_hi, 4.0f, 1.7f));
+    const float door_lo = side > 0 ? half - 0.05f : -half, door_hi = side > 0 ? half : -half + 0.05f;
+    for (const float z : {-1.2f, 0.01f}) door.box(vec3(door_lo, 0, z), vec3(door_hi, 3.6f, z + 1.19f));
     for (int k = 1; k < bays; ++k) {  // ceiling beams over the aisles
       const float x = -half + kBay * static_cast<float>(k);
       const float from = side > 0 ? kHalfCourt + kWall : -depth, to = side > 0 ? depth : -kHalfCourt - kWall;
@@ -166,6 +174,7 @@ void add_shell(Scene& scene, const Materials& m, int bays) {
   add_static(scene, plaster, "slabs", m.plaster);
   add_static(scene, brick, "walls", m.brick);
   add_static(scene, trim, "mouldings", m.trim);
+  add_static(scene, door, "doors", add_surface(scene, "door", vec3(0.22f, 0.11f, 0.06f), 0.5f));
 }
 
 constexpr std::array<vec3, 5> kDrapeColors = {vec3(0.62f, 0.05f, 0.04f), vec3(0.06f, 0.30f, 0.10f),
@@ -247,7 +256,7 @@ void add_sun(Scene& scene, float elevation_degrees) {
   PunctualLight sun;
   sun.name = "sun";
   sun.type = LightType::kDirectional;
-  sun.color = vec3(24, 21.5f, 17.5f);
+  sun.color = vec3(16, 14.4f, 12);
   const auto towards = [=](float azimuth) {
     const float elevation = elevation_degrees * kPi / 180;
     return vec3(cosine(elevation) * cosine(azimuth), sine(elevation), cosine(elevation) * sine(azimuth));

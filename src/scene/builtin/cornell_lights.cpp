@@ -68,6 +68,7 @@ void animate_solid(Scene& scene, int node, vec3 centre, vec3 room, std::uint32_t
   const vec3 axis = glm::normalize(vec3(random.uniform(-1, 1), 1, random.uniform(-1, 1)));
   const vec3 amplitude =
       room * vec3(random.uniform(0.4f, 1), random.uniform(0.4f, 1), random.uniform(0.4f, 1));
+  scene.nodes[node].rotation = axis_angle(axis, 2 * kPi * phase);
   if (index % 2 == 0)
     animate_rotation(scene, node, kPeriod, 8, Interpolation::kLinear,
                      [=](float t) { return axis_angle(axis, 2 * kPi * (turns * t + phase)); });

@@ -13,11 +13,11 @@ namespace lumigrove::builtin {
 namespace {
 
 constexpr float kHalfWidth = 60;     // metres; the land is a square
-constexpr float kTotalFlux = 12000;  // W, all fireflies together
-constexpr float kRadiance = 100;  // W/(sr m^2) of a luminous triangle, while that keeps it under kLargestEdge
+constexpr float kTotalFlux = 20000;  // W, all fireflies together
+constexpr float kRadiance = 300;  // W/(sr m^2) of a luminous triangle, while that keeps it under kLargestEdge
 constexpr float kLargestEdge = 0.3f;  // metres
 constexpr float kPeriod = 10;         // seconds
-constexpr vec2 kEye(0, 44);           // x, z of the camera
+constexpr vec2 kEye(-3, 46);          // x, z of the camera
 enum Purpose : std::uint32_t { kHills, kSwarm, kTree, kRock };
 
 // Colours of the swarms, luminance about one.
@@ -58,7 +58,7 @@ void add_trees(Scene& scene, const Land& land, std::uint32_t seed) {
     RandomStream random(seed, kTree, i);
     const vec2 p(random.uniform(-kHalfWidth, kHalfWidth), random.uniform(-kHalfWidth, kHalfWidth));
     const float size = random.uniform(0.7f, 1.7f), turn = random.uniform(0, 2 * kPi);
-    if (glm::length(p - kEye) < 9 || std::abs(p.x - 5 * sine(p.y * 0.09f)) < 4) continue;
+    if (glm::length(p - kEye) < 16 || std::abs(p.x - 5 * sine(p.y * 0.09f)) < 4) continue;
     const int node =
         add_node(scene, "tree", {trunk, needles}, land.on_ground(p), axis_angle(vec3(0, 1, 0), turn));
     scene.nodes[node].scale = vec3(size);
@@ -171,8 +171,8 @@ Scene make(const Parameters& parameters) {
     add_points(scene, land, n, seed);
   else
     add_triangles(scene, land, n, seed);
-  const vec3 eye = land.on_ground(kEye, 3.2f);
-  add_camera(scene, "camera", eye, land.on_ground(vec2(0, 8), 1.0f), 50);
+  const vec3 eye = land.on_ground(kEye, 4.5f);
+  add_camera(scene, "camera", eye, land.on_ground(vec2(0, 8), 0.5f), 45);
   return scene;
 }
 

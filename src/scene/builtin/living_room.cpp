@@ -155,7 +155,7 @@ void add_floor_lamp(Scene& scene, const Materials& m, vec3 at) {
   const int stand = add_mesh(scene, builder, "floor lamp stand", m.brass);
   add_node(scene, "floor lamp", {stand}, at);
   add_node(scene, "floor lamp shade", {add_shade(scene, m, 0.25f, 0.16f, 0.34f)}, at + vec3(0, 1.42f, 0));
-  add_node(scene, "floor lamp bulb", {add_bulb(scene, "floor lamp bulb", 0.05f, 60, kWarm)},
+  add_node(scene, "floor lamp bulb", {add_bulb(scene, "floor lamp bulb", 0.075f, 90, kWarm)},
            at + vec3(0, 1.58f, 0));
 }
 
@@ -167,7 +167,7 @@ void add_table_lamps(Scene& scene, const Materials& m, std::span<const vec3> pla
   const int ceramic = add_mesh(scene, builder, "table lamp foot",
                                add_surface(scene, "ceramic", vec3(0.1f, 0.25f, 0.42f), 0.25f));
   const int shade = add_shade(scene, m, 0.17f, 0.11f, 0.22f);
-  const int bulb = add_bulb(scene, "table lamp bulb", 0.035f, 32, kWarm);
+  const int bulb = add_bulb(scene, "table lamp bulb", 0.055f, 40, kWarm);
   for (const vec3 at : places) {
     add_node(scene, "table lamp", {ceramic}, at);
     add_node(scene, "table lamp shade", {shade}, at + vec3(0, 0.36f, 0));
@@ -191,7 +191,7 @@ void add_pendant(Scene& scene, const Materials& m, vec3 hook) {
   scene.materials[copper].double_sided = true;
   const int shade = add_mesh(scene, builder, "pendant dome", copper);
   const int pivot = add_node(scene, "pendant", {wire, shade}, hook);
-  add_node(scene, "pendant bulb", {add_bulb(scene, "pendant bulb", 0.04f, 45, kWarm)},
+  add_node(scene, "pendant bulb", {add_bulb(scene, "pendant bulb", 0.07f, 60, kWarm)},
            vec3(0, -cord - 0.12f, 0), vec4(0, 0, 0, 1), pivot);
   animate_rotation(scene, pivot, kPeriod, 12, Interpolation::kCubicSpline,
                    [](float t) { return axis_angle(vec3(0, 0, 1), 0.06f * sine(2 * kPi * 2 * t)); });
@@ -203,7 +203,7 @@ void add_sconces(Scene& scene, const Materials& m, std::span<const vec3> places)
   const vec2 bowl[] = {{0.03f, 0}, {0.1f, 0.03f}, {0.13f, 0.09f}, {0.14f, 0.16f}};
   builder.lathe(vec3(0), bowl, 32, true);
   const int shade = add_mesh(scene, builder, "sconce", m.shade);
-  const int bulb = add_bulb(scene, "sconce bulb", 0.03f, 22, kWarm);
+  const int bulb = add_bulb(scene, "sconce bulb", 0.05f, 35, kWarm);
   for (const vec3 at : places) add_node(scene, "sconce", {shade, bulb}, at);
 }
 
@@ -422,7 +422,7 @@ Scene make(const Parameters& parameters) {
   add_sideboard(scene, m, vec3(1.15f, 0, -2.65f), vec3(2.75f, 0.75f, -2.22f));
   const vec3 lamps[] = {{-2.1f, 0.53f, -2.1f}, {1.45f, 0.75f, -2.42f}};
   add_table_lamps(scene, m, lamps);
-  add_floor_lamp(scene, m, vec3(-2.9f, 0, 1.0f));
+  add_floor_lamp(scene, m, vec3(-2.75f, 0, -0.3f));
   add_pendant(scene, m, vec3(-0.45f, kHeight, -0.45f));
   const vec3 sconces[] = {{-kHalfWidth + 0.16f, 1.75f, 1.9f}, {kHalfWidth - 0.16f, 1.75f, 0.9f}};
   add_sconces(scene, m, sconces);
@@ -430,7 +430,7 @@ Scene make(const Parameters& parameters) {
   add_picture(scene, m, vec3(-0.2f, 1.65f, -kHalfDepth), vec2(0.5f, 0.65f), seed * 16 + 2);
   add_mirror(scene, m, vec3(1.95f, 1.6f, -kHalfDepth), 0.42f);
   add_plant(scene, vec3(-2.95f, 0, -2.2f), seed);
-  add_camera(scene, "camera", vec3(1.75f, 1.45f, 2.5f), vec3(-0.55f, 0.85f, -1.6f), 52);
+  add_camera(scene, "camera", vec3(0.65f, 1.5f, 2.62f), vec3(-0.1f, 0.95f, -1.6f), 56);
   return scene;
 }
 

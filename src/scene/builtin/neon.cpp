@@ -7,7 +7,7 @@
 namespace lumigrove::builtin {
 namespace {
 
-constexpr float kTubeRadius = 0.03f;
+constexpr float kTubeRadius = 0.045f;
 constexpr int kTubeSides = 5;
 constexpr float kLineHeight = 1.25f;  // of stacked letters
 

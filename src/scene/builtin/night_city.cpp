@@ -19,7 +19,7 @@ namespace {
 constexpr float kLot = 56, kStreet = 16, kPitch = kLot + kStreet;  // metres
 constexpr float kHalfRoad = 5.2f, kCurb = 0.15f;
 constexpr float kPeriod = 8;  // seconds
-constexpr float kBulbShare = 0.33f, kNeonShare = 0.22f, kLampShare = 0.04f;
+constexpr float kBulbShare = 0.28f, kNeonShare = 0.22f, kLampShare = 0.04f;
 constexpr std::size_t kMostLamps = 3000;
 enum Purpose : std::uint32_t { kPlan, kWindowColor, kBulb, kSign, kTraffic, kLantern, kStains };
 
@@ -32,7 +32,7 @@ struct Plan {
   int streets() const { return blocks + 1; }
   float lo() const { return line(0); }
   float hi() const { return line(blocks); }
-  float camera_z() const { return std::min(96.0f, hi() - 12); }
+  float camera_z() const { return kPitch - 11; }  // just past a crossing
 };
 
 struct City {
@@ -59,7 +59,7 @@ int add_asphalt(Scene& scene, std::uint32_t seed) {
     return glm::mix(0.14f + 0.12f * grain(p), 0.09f + 0.02f * grain(p), puddle(p)) * vec3(1, 1, 1.06f);
   });
   const int roughness = add_roughness_image(scene, "asphalt roughness", kSize, [&](vec2 p) {
-    return glm::mix(0.62f + 0.2f * grain(p), 0.34f, puddle(p));
+    return glm::mix(0.62f + 0.2f * grain(p), 0.4f, puddle(p));
   });
   scene.materials[material].base_color_texture = tiled(color, tile);
   scene.materials[material].metallic_roughness_texture = tiled(roughness, tile);
@@ -135,12 +135,17 @@ void add_block(City& city, int i, int j, WallBuilders& walls) {
       shape.lo = lo + lot * vec2(a, b);
       shape.hi = shape.lo + lot - gap;
       shape.base = kCurb;
-      shape.floors = 3 + random.integer(6) + (random.chance(0.22f) ? 5 + random.integer(8) : 0);
+      shape.windowed = (a == 0 ? kLeft : 0u) | (a + 1 == nx ? kRight : 0u) | (b == 0 ? kBack : 0u) |
+                       (b + 1 == nz ? kFront : 0u);
+      shape.floors = 4 + random.integer(6) + (random.chance(0.22f) ? 5 + random.integer(8) : 0);
       shape.floor_height = random.uniform(3.1f, 3.7f);
       shape.bay = random.uniform(2.9f, 4.2f);
       shape.pilasters = random.chance(0.6f);
       shape.bands = !shape.pilasters || random.chance(0.5f);
-      shape.weight = random.uniform(0.4f, 1.6f);
+      const bool main_street = std::min(std::abs(shape.lo.x), std::abs(shape.hi.x)) < kStreet;
+      shape.weight = random.uniform(0.4f, 1.6f) * (main_street ? 2.0f : 1.0f);
+      shape.panes_across = 1 + random.integer(2);
+      shape.panes_down = 1 + random.integer(2);
       MeshBuilder& builder = walls[static_cast<std::size_t>(random.integer(static_cast<int>(walls.size())))];
       add_building(shape, builder, city.windows, city.facades);
       add_rooftop(shape, random, builder);
@@ -172,30 +177,31 @@ void add_buildings(City& city) {
 // --- windows
 // --------------------------------------------------------------------------------------------------
 
-constexpr std::array<vec3, 8> kWindowRadiance = {
-    vec3(2.3f, 1.45f, 0.65f), vec3(1.6f, 1.05f, 0.5f), vec3(2.6f, 1.9f, 1.1f),  vec3(1.8f, 1.75f, 1.6f),
-    vec3(0.9f, 0.55f, 0.25f), vec3(0.35f, 0.6f, 1.2f), vec3(1.3f, 0.7f, 0.28f), vec3(3.2f, 2.5f, 1.6f)};
-constexpr std::size_t kShopColor = 7;
+// The last two are for shops.
+constexpr std::array<vec3, 9> kWindowRadiance = {
+    vec3(1.0f, 0.6f, 0.24f),  vec3(0.6f, 0.36f, 0.14f), vec3(1.1f, 0.75f, 0.38f),
+    vec3(0.6f, 0.6f, 0.56f),  vec3(0.35f, 0.2f, 0.08f), vec3(0.12f, 0.24f, 0.55f),
+    vec3(0.5f, 0.24f, 0.08f), vec3(1.3f, 0.9f, 0.42f),  vec3(0.8f, 0.9f, 1.0f)};
 
-// Lights as many panes as make up `triangles`; each is cut finer when there are too few.
+// Lights windows of together about `triangles`; panes are cut finer when there are too few.
 void add_windows(City& city, std::size_t triangles) {
+  std::size_t available = 0;
+  for (const WindowSlot& slot : city.windows) available += slot.triangles();
   int cuts = 1;
-  while (2 * static_cast<std::size_t>(cuts * cuts) * city.windows.size() < triangles) ++cuts;
-  const auto per_window = 2 * static_cast<std::size_t>(cuts * cuts);
-  const std::vector<bool> lit =
-      choose_lit(city.windows, (triangles + per_window / 2) / per_window, city.plan.seed);
+  while (static_cast<std::size_t>(cuts * cuts) * available < triangles) ++cuts;
+  for (WindowSlot& slot : city.windows) slot.across *= cuts, slot.down *= cuts;
+  const std::vector<bool> lit = choose_lit(city.windows, triangles, city.plan.seed);
   std::array<MeshBuilder, kWindowRadiance.size()> panes;
   MeshBuilder dark;
   for (std::size_t i = 0; i < city.windows.size(); ++i) {
     const WindowSlot& slot = city.windows[i];
-    if (!lit[i]) {
-      dark.quad(slot.corner, slot.u, slot.v);
-      continue;
-    }
+    // Unlit glass, or the frame seen between lit panes.
+    const vec3 behind = lit[i] ? -0.01f * glm::normalize(glm::cross(slot.u, slot.v)) : vec3(0);
+    dark.quad(slot.corner + behind, slot.u, slot.v);
+    if (!lit[i]) continue;
     RandomStream random(city.plan.seed, kWindowColor, static_cast<std::uint32_t>(i));
-    const std::size_t color =
-        slot.shop ? (random.chance(0.6f) ? kShopColor : 3) : static_cast<std::size_t>(random.integer(7));
-    panes[color].quad(slot.corner, slot.u, slot.v, cuts, cuts);
+    const std::size_t color = static_cast<std::size_t>(slot.shop ? 7 + random.integer(2) : random.integer(7));
+    add_panes(panes[color], slot, 0.07f / static_cast<float>(cuts));
   }
   for (std::size_t c = 0; c < panes.size(); ++c) {
     const std::string name = "lit windows " + std::to_string(c + 1);
@@ -229,7 +235,7 @@ LampModel add_lamp_model(Scene& scene) {
                      0.17f * sine(kPi * static_cast<float>(k) / 4));
   builder.polygon(rim);
   model.lens_triangles = builder.triangle_count();
-  model.lens = add_mesh(scene, builder, "lamp lens", add_emitter(scene, "lamp lens", vec3(250, 165, 80)));
+  model.lens = add_mesh(scene, builder, "lamp lens", add_emitter(scene, "lamp lens", vec3(380, 245, 115)));
   return model;
 }
 
@@ -259,9 +265,11 @@ void add_lamps(City& city, std::size_t triangles) {
 // --- strings of bulbs
 // -----------------------------------------------------------------------------------------
 
-constexpr std::array<vec3, 6> kBulbRadiance = {vec3(60, 34, 12), vec3(64, 10, 8),  vec3(12, 50, 14),
-                                               vec3(10, 22, 72), vec3(56, 12, 50), vec3(54, 44, 10)};
-constexpr int kBulbsPerColor = 4;
+constexpr std::array<vec3, 6> kBulbRadiance = {vec3(26, 13, 2.7f), vec3(27, 0.85f, 0.51f),
+                                               vec3(1, 22, 1.7f),  vec3(0.85f, 3.7f, 37),
+                                               vec3(24, 1, 19),    vec3(24, 16, 0.85f)};
+constexpr int kBulbsPerColor = 3;
+constexpr float kBulbRadius = 0.15f;
 
 struct StringModel {
   std::vector<int> meshes;  // wire, then one a colour
@@ -320,7 +328,7 @@ std::vector<StringSpot> string_spots(const Plan& plan, float spacing) {
 void add_strings(City& city, std::size_t triangles, int subdivisions) {
   const StringModel model = add_string_model(city.scene, subdivisions);
   const std::size_t wanted = std::max<std::size_t>(1, triangles / model.triangles);
-  float spacing = 9;
+  float spacing = 7;
   std::vector<StringSpot> spots = string_spots(city.plan, spacing);
   while (spots.size() < wanted) spots = string_spots(city.plan, spacing *= 0.8f);
   for (std::size_t i = 0; i < wanted; ++i) {
@@ -341,8 +349,9 @@ void add_strings(City& city, std::size_t triangles, int subdivisions) {
 // --- neon signs
 // -----------------------------------------------------------------------------------------------
 
-constexpr std::array<vec3, 6> kNeonRadiance = {vec3(46, 3, 6),  vec3(4, 18, 58), vec3(3, 40, 16),
-                                               vec3(44, 4, 40), vec3(48, 20, 2), vec3(6, 36, 40)};
+constexpr std::array<vec3, 6> kNeonRadiance = {vec3(33, 0.75f, 1.7f), vec3(0.75f, 6, 39),
+                                               vec3(0.6f, 27, 7.5f),  vec3(30, 1, 24),
+                                               vec3(33, 9, 0.45f),    vec3(0.9f, 22, 27)};
 constexpr std::array<std::string_view, 14> kWords = {"HOTEL",   "CAFE",  "BAR",     "JAZZ",  "OPEN",
                                                      "CINEMA",  "CLUB",  "NOODLES", "PIZZA", "DANCE",
                                                      "KARAOKE", "BOOKS", "TAXI",    "LUX"};
@@ -399,10 +408,11 @@ std::vector<SignSpot> sign_spots(const City& city) {
     if (std::abs(offset - std::round(offset)) > 0.01f) continue;  // looks into the block
     const bool main_street = std::abs(wall.normal.x) > 0.5f && std::abs(front.x) < 1;
     RandomStream random(city.plan.seed, kSign, static_cast<std::uint32_t>(f));
+    // First along the main street before the camera, then everywhere.
+    const float ahead = city.plan.camera_z() - front.z;
+    const float first = main_street && ahead > 0 ? 0.1f * ahead / kPitch : 1;
     for (float at = 2.5f; at < wall.width - 2; at += 5)
-      spots.push_back(
-          {f, at,
-           random.uniform() * (main_street ? 0.06f : 1.0f) + (front.z > city.plan.camera_z() ? 0.5f : 0.0f)});
+      spots.push_back({f, at, first + 0.25f * random.uniform()});
   }
   std::stable_sort(spots.begin(), spots.end(),
                    [](const SignSpot& a, const SignSpot& b) { return a.order < b.order; });
@@ -506,7 +516,7 @@ void add_traffic(City& city) {
         RandomStream random(city.plan.seed, kTraffic,
                             static_cast<std::uint32_t>(k * 4 + (along_x ? 2 : 0) + (direction > 0 ? 1 : 0)));
         // The two directions of streets take the crossings half a period apart.
-        const float phase = (along_x ? 0.5f : 0.0f) + random.uniform(-0.08f, 0.08f) + 0.3f;
+        const float phase = (along_x ? 0.5f : 0.0f) + random.uniform(-0.08f, 0.08f) + 0.45f;
         add_lane(city, cars[static_cast<std::size_t>(random.integer(3))], along_x, city.plan.line(k),
                  direction, phase);
       }
@@ -519,7 +529,7 @@ void add_traffic(City& city) {
 void add_lanterns(City& city) {
   MeshBuilder builder;
   builder.cylinder(vec3(0), vec3(0, 0.35f, 0), 0.3f, 0, 6);
-  const int kite = add_mesh(city.scene, builder, "kite", add_surface(city.scene, "kite", vec3(0.5f)));
+  const int kite = add_mesh(city.scene, builder, "kite", add_surface(city.scene, "kite", vec3(0.2f)));
   for (std::uint32_t i = 0; i < 24; ++i) {
     RandomStream random(city.plan.seed, kLantern, i);
     const vec3 centre(random.uniform(-5, 5), random.uniform(8, 13),
@@ -532,8 +542,8 @@ void add_lanterns(City& city) {
     });
     PunctualLight light;
     light.name = "lantern light";
-    light.color = 0.35f * kBulbRadiance[i % kBulbRadiance.size()];
-    add_light_node(city.scene, light, vec3(0, -0.12f, 0), vec4(0, 0, 0, 1), node);
+    light.color = 0.6f * kBulbRadiance[i % kBulbRadiance.size()];
+    add_light_node(city.scene, light, vec3(0, -0.7f, 0), vec4(0, 0, 0, 1), node);
   }
 }
 
@@ -552,8 +562,8 @@ Scene make(const Parameters& parameters) {
   add_signs(city, share(kNeonShare));
   add_windows(city, lights > city.emissive ? lights - city.emissive : 0);
   const float z = city.plan.camera_z();
-  add_camera(city.scene, "street", vec3(1.6f, 3.4f, z), vec3(-0.8f, 4.6f, z - 40), 48);
-  add_camera(city.scene, "roofs", vec3(30, 46, z + 20), vec3(-10, 0, z - 90), 50);
+  add_camera(city.scene, "street", vec3(0.3f, 2.5f, z), vec3(-0.5f, 5.2f, z - 40), 52);
+  add_camera(city.scene, "roofs", vec3(3, 62, z + 60), vec3(0, 0, z - 50), 50);
   return std::move(city.scene);
 }
 

@@ -13,7 +13,7 @@ void add_triangle_light(Scene& scene) {
   MeshBuilder light;
   light.flat_triangle(kLightPosition + 0.3f * up, kLightPosition + 0.26f * side - 0.15f * up,
                       kLightPosition - 0.26f * side - 0.15f * up);
-  const int mesh = add_mesh(scene, light, "light", add_emitter(scene, "light", vec3(60, 54, 44)));
+  const int mesh = add_mesh(scene, light, "light", add_emitter(scene, "light", vec3(120, 108, 88)));
   add_node(scene, "light", {mesh});
 }
 
@@ -21,7 +21,7 @@ void add_punctual_light(Scene& scene, LightType type) {
   PunctualLight light;
   light.name = "light";
   light.type = type;
-  light.color = vec3(11, 10, 8);
+  light.color = vec3(20, 18, 14.5f);
   light.inner_cone = 0.25f;
   light.outer_cone = 0.4f;
   add_light_node(scene, light, kLightPosition, looking_along(vec3(0, 0.3f, 0) - kLightPosition));

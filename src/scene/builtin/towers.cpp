@@ -12,8 +12,8 @@
 namespace lumigrove::builtin {
 namespace {
 
-constexpr int kColumns = 6, kRows = 7;
-constexpr float kPitch = 38;   // metres from tower to tower
+constexpr int kColumns = 6, kRows = 6;
+constexpr float kPitch = 31;   // metres from tower to tower
 constexpr float kPeriod = 24;  // seconds, once around
 enum Purpose : std::uint32_t { kShape, kTint };
 
@@ -22,7 +22,7 @@ constexpr std::array<vec3, 3> kRadiance = {vec3(5.2f, 3.8f, 2.3f), vec3(4.2f, 4.
                                            vec3(3.3f, 4.1f, 5.0f)};
 
 BuildingShape tower(RandomStream& random, vec2 centre) {
-  const vec2 half(random.uniform(8, 12), random.uniform(8, 12));
+  const vec2 half(random.uniform(7.5f, 10), random.uniform(7.5f, 10));
   BuildingShape shape;
   shape.lo = centre - half;
   shape.hi = centre + half;
@@ -30,6 +30,7 @@ BuildingShape tower(RandomStream& random, vec2 centre) {
   shape.ground_floor = 5;
   shape.floor_height = 3.6f;
   shape.bay = random.uniform(3.2f, 4.4f);
+  shape.margin = vec2(0.8f, 1.2f);
   shape.shops = false;
   shape.pilasters = random.chance(0.5f);
   shape.bands = !shape.pilasters;
@@ -51,7 +52,7 @@ void add_crown(const BuildingShape& shape, RandomStream& random, MeshBuilder& wa
 
 void add_windows(Scene& scene, const std::vector<WindowSlot>& windows, std::size_t triangles,
                  std::uint32_t seed) {
-  const std::vector<bool> lit = choose_lit(windows, triangles / 2, seed);
+  const std::vector<bool> lit = choose_lit(windows, triangles, seed);
   std::array<MeshBuilder, kRadiance.size()> panes;
   for (std::size_t i = 0; i < windows.size(); ++i) {
     if (!lit[i]) continue;
@@ -87,7 +88,7 @@ Scene make(const Parameters& parameters) {
   for (int j = 0; j < kRows; ++j)
     for (int i = 0; i < kColumns; ++i) {
       RandomStream random(seed, kShape, static_cast<std::uint32_t>(j * kColumns + i));
-      const vec2 centre((static_cast<float>(i) - 0.5f * (kColumns - 1)) * kPitch,
+      const vec2 centre((static_cast<float>(i) - 0.5f * (kColumns - 1) + 0.7f) * kPitch,
                         static_cast<float>(j) * kPitch);
       const BuildingShape shape = tower(random, centre);
       add_building(shape, builder, windows, facades);
