@@ -644,6 +644,19 @@ TEST_F(Gltf, WhatIsNoGltfIsRefused) {
   EXPECT_THROW(import_gltf(folder_ / "gone.glb"), Error);
 }
 
+TEST_F(Gltf, LoadSceneChoosesByNameAndExtension) {
+  write(folder_ / "UPPER.GLB", shown_triangle().glb());
+  EXPECT_EQ(load_scene((folder_ / "UPPER.GLB").string()).meshes.size(), 1u);
+  EXPECT_EQ(load_scene("single").name, "single");
+  try {
+    load_scene("nowhere.glb");
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_TRUE(contains(error.what(), "'nowhere.glb'") && contains(error.what(), "night-city"))
+        << error.what();
+  }
+}
+
 TEST_F(Gltf, IndicesOutOfRangeAreRefusedAndNaNVerticesDropTheirTriangles) {
   Asset asset = shown_triangle();
   const int indices = asset.accessor(std::vector<std::uint8_t>{0, 1, 3}, kUnsignedByte, "SCALAR", 3);

@@ -121,7 +121,11 @@ void check_version(const Json& json, const std::string& name) {
   const auto asset = json.find("asset");
   if (asset == json.end() || !asset->is_object())
     throw Error(fmt::format("{}: not a glTF asset ('asset' is missing)", name));
-  const std::string version = string_member(*asset, "version", name);
+  // A number (glTF 1.0 had one) is shown as it is.
+  const auto found = asset->find("version");
+  const std::string version = found == asset->end() ? ""
+                              : found->is_string()  ? found->get<std::string>()
+                                                    : found->dump(-1, ' ', true);
   const std::string minimum = string_member(*asset, "minVersion", name);
   if (version.rfind("2.", 0) != 0)
     throw Error(fmt::format("{}: glTF version '{}' is not supported, only 2.x", name, version));

@@ -63,8 +63,10 @@ std::vector<T> read_rgba(OIIO::ImageInput& input, OIIO::TypeDesc type, T opaque,
   const int channels = std::min(spec.nchannels, 4);
   const std::size_t pixels = static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height);
   std::vector<T> raw(pixels * static_cast<std::size_t>(channels));
-  if (!input.read_image(0, 0, 0, channels, type, raw.data()))
-    throw Error(fmt::format("{}: the image is damaged ({})", name, first_line(input.geterror())));
+  if (!input.read_image(0, 0, 0, channels, type, raw.data())) {
+    const std::string reason = first_line(input.geterror());
+    throw Error(fmt::format("{}: the image is damaged ({})", name, reason));
+  }
   if (channels == 4) return raw;
   std::vector<T> rgba(4 * pixels);
   const bool grey = channels <= 2, alpha = channels == 2;
