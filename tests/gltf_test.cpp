@@ -278,6 +278,19 @@ TEST_F(Gltf, OnlyTheDefaultSceneIsKept) {
   EXPECT_EQ(evaluate(load(asset), 0).instances.size(), 2u);
 }
 
+TEST_F(Gltf, NodesKeepTheOrderOfTheFile) {
+  Asset asset = shown_triangle();
+  asset.json["nodes"] = {
+      {{"mesh", 0}, {"name", "child"}}, {{"name", "apart"}}, {{"name", "root"}, {"children", {0}}}};
+  asset.json["scenes"] = {{{"nodes", {2}}}};
+  const Scene scene = load(asset);
+  ASSERT_EQ(scene.nodes.size(), 2u);
+  EXPECT_EQ(scene.nodes[0].name, "child");
+  EXPECT_EQ(scene.nodes[0].parent, 1);
+  EXPECT_EQ(scene.nodes[1].name, "root");
+  EXPECT_EQ(scene.nodes[1].parent, -1);
+}
+
 TEST_F(Gltf, CyclesAndSharedChildrenAreErrors) {
   Asset asset;
   asset.json["nodes"] = {{{"children", {1}}}, {{"children", {0}}}};

@@ -244,19 +244,25 @@ class Importer {
 
   // --- meshes ---
 
-  // Indices of the scene's meshes for a glTF mesh, made on first use.
-  const std::vector<int>& meshes_of(int index, const std::string& user) {
-    const tinygltf::Mesh& source = element(file_.model.meshes, index, "mesh", user);
-    const auto [found, added] = meshes_.try_emplace(index);
-    if (added)
+  // The meshes that reached nodes show, in the order of the file.
+  void import_meshes(const std::vector<int>& reached) {
+    for (const int index : reached) {
+      const tinygltf::Node& node = file_.model.nodes[static_cast<std::size_t>(index)];
+      if (node.mesh == -1) continue;
+      element(file_.model.meshes, node.mesh, "mesh",
+              label("node", static_cast<std::size_t>(index), node.name));
+      meshes_.try_emplace(node.mesh);
+    }
+    for (auto& [index, parts] : meshes_) {
+      const tinygltf::Mesh& source = file_.model.meshes[static_cast<std::size_t>(index)];
+      const std::string user = label("mesh", static_cast<std::size_t>(index), source.name);
       for (const tinygltf::Primitive& primitive : source.primitives)
-        if (std::optional<Mesh> mesh =
-                import_primitive(primitive, label("mesh", static_cast<std::size_t>(index), source.name))) {
+        if (std::optional<Mesh> mesh = import_primitive(primitive, user)) {
           mesh->name = source.name;
-          found->second.push_back(static_cast<int>(scene_.meshes.size()));
+          parts.push_back(static_cast<int>(scene_.meshes.size()));
           scene_.meshes.push_back(std::move(*mesh));
         }
-    return found->second;
+    }
   }
 
   std::optional<Mesh> import_primitive(const tinygltf::Primitive& source, const std::string& user) {
@@ -359,25 +365,43 @@ class Importer {
     return roots;
   }
 
-  // Depth first in the order of the file; each node once, so that hostile hierarchies end.
-  void import_nodes() {
-    nodes_.assign(file_.model.nodes.size(), -1);
-    std::vector<std::pair<int, int>> open;  // glTF node, parent in the scene
-    const std::vector<int> roots = root_nodes();
-    for (std::size_t i = roots.size(); i-- > 0;) open.emplace_back(roots[i], -1);
+  // Parents of the nodes that `roots` reach (-1: a root, -2: not reached). Each node is entered once, so that
+  // hostile hierarchies end.
+  std::vector<int> parents_of_reached(const std::vector<int>& roots) const {
+    constexpr int kRoot = -1, kNotReached = -2;
+    std::vector<int> parents(file_.model.nodes.size(), kNotReached);
+    std::vector<std::pair<int, int>> open;  // node, parent
+    for (const int root : roots) open.emplace_back(root, kRoot);
     while (!open.empty()) {
       const auto [index, parent] = open.back();
       open.pop_back();
-      const tinygltf::Node& source = element(file_.model.nodes, index, "node", "the hierarchy");
-      int& placed = nodes_[static_cast<std::size_t>(index)];
-      if (placed != -1)
+      const tinygltf::Node& node = element(file_.model.nodes, index, "node", "the hierarchy");
+      int& known = parents[static_cast<std::size_t>(index)];
+      if (known != kNotReached)
         fail(fmt::format("{} appears twice in the hierarchy",
-                         label("node", static_cast<std::size_t>(index), source.name)));
-      placed = static_cast<int>(scene_.nodes.size());
-      const int here = placed;
-      scene_.nodes.push_back(
-          import_node(source, parent, label("node", static_cast<std::size_t>(index), source.name)));
-      for (std::size_t i = source.children.size(); i-- > 0;) open.emplace_back(source.children[i], here);
+                         label("node", static_cast<std::size_t>(index), node.name)));
+      known = parent;
+      for (const int child : node.children) open.emplace_back(child, index);
+    }
+    return parents;
+  }
+
+  // The reached nodes in the order of the file: light and instance numbers survive a round trip.
+  void import_nodes() {
+    const std::vector<int> parents = parents_of_reached(root_nodes());
+    std::vector<int> reached;
+    nodes_.assign(parents.size(), -1);
+    for (std::size_t i = 0; i < parents.size(); ++i) {
+      if (parents[i] < -1) continue;
+      nodes_[i] = static_cast<int>(reached.size());
+      reached.push_back(static_cast<int>(i));
+    }
+    import_meshes(reached);
+    for (const int index : reached) {
+      const std::size_t i = static_cast<std::size_t>(index);
+      const tinygltf::Node& source = file_.model.nodes[i];
+      const int parent = parents[i] < 0 ? -1 : nodes_[static_cast<std::size_t>(parents[i])];
+      scene_.nodes.push_back(import_node(source, parent, label("node", i, source.name)));
     }
   }
 
@@ -394,7 +418,7 @@ class Importer {
         for (int r = 0; r < 4; ++r)
           node.matrix[c][r] = static_cast<float>(source.matrix[static_cast<std::size_t>(4 * c + r)]);
     }
-    if (source.mesh != -1) node.meshes = meshes_of(source.mesh, user);
+    if (source.mesh != -1) node.meshes = meshes_.at(source.mesh);
     if (source.camera != -1) node.camera = element(cameras_, source.camera, "camera", user);
     if (node.camera >= 0) {
       std::string& name = scene_.cameras[static_cast<std::size_t>(node.camera)].name;
