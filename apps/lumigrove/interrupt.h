@@ -3,8 +3,8 @@
 
 namespace lumigrove {
 
-// While one lives, the first signal only sets a mark; a second one ends the program at once, as without the
-// guard.
+// While one lives, the first signal only sets a mark (and says so on a terminal); a second one ends the
+// program at once, as without the guard.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -5,6 +5,8 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
+
 #include "lumigrove/error.h"
 
 namespace lumigrove {
@@ -17,6 +19,19 @@ spdlog::level::level_enum level_of(const LogOptions& options) {
   if (options.quiet) return spdlog::level::err;
   if (options.verbosity == 0) return spdlog::level::warn;
   return options.verbosity == 1 ? spdlog::level::info : spdlog::level::debug;
+}
+
+// spdlog would make the folders, a typing mistake included.
+spdlog::sink_ptr open_log_file(const std::string& name) {
+  const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+  std::error_code ignored;
+  try {
+    if (folder.empty() || std::filesystem::is_directory(folder, ignored))
+      return std::make_shared<spdlog::sinks::basic_file_sink_mt>(name, true);
+  } catch (const spdlog::spdlog_ex&) {
+    // told below
+  }
+  throw Error(fmt::format("cannot write log file '{}'", name));
 }
 
 }  // namespace
@@ -39,11 +54,7 @@ void start_logging(const LogOptions& options) {
   terminal->set_pattern("lumigrove: %l: %v");
   std::vector<spdlog::sink_ptr> sinks{terminal};
   if (!options.file.empty()) {
-    try {
-      sinks.push_back(std::make_shared<spdlog::sinks::basic_file_sink_mt>(options.file, true));
-    } catch (const spdlog::spdlog_ex&) {
-      throw Error(fmt::format("cannot write log file '{}'", options.file));
-    }
+    sinks.push_back(open_log_file(options.file));
     sinks.back()->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l: %v");
   }
   auto logger = std::make_shared<spdlog::logger>("lumigrove", sinks.begin(), sinks.end());

@@ -1,5 +1,6 @@
 // lumigrove scene info|list|export
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cctype>
@@ -55,6 +56,7 @@ struct ExportOptions {
   std::vector<std::string> size = {"1280", "720"};
   double time = 0;
   int spp = 64;
+  bool force_diffuse = false;
 };
 
 std::string lower_extension(const std::filesystem::path& file) {
@@ -71,25 +73,23 @@ int camera_index(const Scene& scene, const SceneState& state, const std::string&
   return -1;
 }
 
-void export_scene(const ExportOptions& options, const Scene& scene) {
-  if (lower_extension(options.file) != ".pbrt") {
-    export_gltf(scene, options.file);
-    return;
-  }
+// Writes the file; returns a sentence for each thing that the format cannot hold.
+std::vector<std::string> export_scene(const ExportOptions& options, const Scene& scene) {
+  if (lower_extension(options.file) != ".pbrt") return export_gltf(scene, options.file);
   Settings settings;
   set_value(settings, "width", options.size.at(0));
   set_value(settings, "height", options.size.at(1));
   check(settings);
   const SceneState state = evaluate(scene, options.time);
-  export_pbrt(scene, options.time, camera_index(scene, state, options.camera), settings.width,
-              settings.height, options.spp, options.file);
+  return export_pbrt(scene, options.time, camera_index(scene, state, options.camera), settings.width,
+                     settings.height, options.spp, options.file, options.force_diffuse);
 }
 
 void run_export(const ExportOptions& options) {
   start_logging(*options.log);
   require_writable(options.file, {".glb", ".gltf", ".pbrt"});
   const Scene scene = open_scene(options.scene->full_name(), options.scene->environment);
-  export_scene(options, scene);
+  for (const std::string& loss : export_scene(options, scene)) spdlog::warn("{}", loss);
   if (!options.log->quiet) fmt::print("wrote {}\n", options.file);
 }
 
@@ -99,7 +99,7 @@ void add_export(CLI::App& scene) {
   options->scene = add_scene_options(*command);
   command
       ->add_option("-o,--output,--outfile", options->file,
-                   "File to write; .pbrt puts meshes and textures beside it")
+                   "File to write; meshes and textures of .pbrt go to a folder beside it")
       ->required()
       ->type_name("FILE");
   command->add_option("--time", options->time, "Moment to write, .pbrt only (s, default 0)")
@@ -112,6 +112,8 @@ void add_export(CLI::App& scene) {
   const auto set_size = [options](const std::vector<std::string>& size) { options->size = size; };
   add_list_option(*command, "--size", 2, 'x', "W H", set_size,
                   "Width and height, also as WxH, .pbrt only (pixels, default 1280x720)");
+  command->add_flag("--force-diffuse", options->force_diffuse,
+                    "Write every material as diffuse, .pbrt only: pbrt's specular lobes differ from ours");
   options->log = add_log_options(*command);
   command->callback([options] { run_export(*options); });
 }
