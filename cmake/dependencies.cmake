@@ -7,7 +7,7 @@ find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_package(TinyGLTF REQUIRED)  # Debian builds it as a shared library
+find_path(TINYGLTF_INCLUDE_DIR tiny_gltf.h REQUIRED)  # compiled into the library, see src/scene/tinygltf.h
 find_path(TOMLPP_INCLUDE_DIR toml++/toml.h REQUIRED)
 
 # OpenImageIO pulls in Imath, whose CMake package lists a Python library that Debian ships separately and that nobody
@@ -23,10 +23,9 @@ set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRE
                       INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "")
 
 # What the static library must be linked with; lumigrove-config.cmake finds the same packages.
-set(LUMIGROVE_LINKED_LIBRARIES TBB::tbb embree TinyGLTF::TinyGLTF assimp::assimp OpenImageIO::OpenImageIO fmt::fmt
-    spdlog::spdlog)
+set(LUMIGROVE_LINKED_LIBRARIES TBB::tbb embree assimp::assimp OpenImageIO::OpenImageIO fmt::fmt spdlog::spdlog)
 
 # For everything built here. Third-party headers are system headers: their warnings are not ours.
 add_library(lumigrove_dependencies INTERFACE)
 target_link_libraries(lumigrove_dependencies INTERFACE ${LUMIGROVE_LINKED_LIBRARIES} nlohmann_json::nlohmann_json)
-target_include_directories(lumigrove_dependencies SYSTEM INTERFACE ${TOMLPP_INCLUDE_DIR})
+target_include_directories(lumigrove_dependencies SYSTEM INTERFACE ${TINYGLTF_INCLUDE_DIR} ${TOMLPP_INCLUDE_DIR})
