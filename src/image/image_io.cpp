@@ -1,12 +1,12 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <mutex>
 #include <string_view>
 
 #include "base/atomic_file.h"
@@ -36,14 +36,11 @@ Format format_of(const fs::path& file) {
                           file.string(), extension));
 }
 
-// OpenImageIO and OpenEXR would each start a pool with a thread for every core; the project's threads are
-// oneTBB's.
-void use_one_thread() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    OIIO::attribute("threads", 1);
-    OIIO::attribute("exr_threads", 1);
-  });
+// OpenImageIO converts pixels on the calling thread; OpenEXR packs and unpacks with as many threads as oneTBB may use
+// here. Neither changes a bit.
+void limit_threads() {
+  OIIO::attribute("threads", 1);
+  OIIO::attribute("exr_threads", tbb::this_task_arena::max_concurrency());
 }
 
 // OpenImageIO's messages may have several lines; ours have one.
@@ -241,53 +238,57 @@ std::vector<std::vector<FileChannel>> group_layers(const OIIO::ImageSpec& spec) 
   return layers;
 }
 
-// The pixels of an open file: ids of the uint32 channels, floats of all others, each with every channel's
-// place.
+// The pixels of an open file, each channel in its own type.
 struct FilePixels {
-  std::size_t pixels = 0, channels = 0;
-  std::vector<float> values;
-  std::vector<std::uint32_t> ids;  // empty when no channel holds ids
+  std::vector<std::byte> bytes;
+  std::size_t count = 0, stride = 0;  // pixels, bytes of one
 };
 
 FilePixels read_pixels(OIIO::ImageInput& input, const fs::path& file) {
   const OIIO::ImageSpec& spec = input.spec();
-  FilePixels read;
-  read.pixels = static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height);
-  read.channels = static_cast<std::size_t>(spec.nchannels);
-  read.values.resize(read.pixels * read.channels);
-  bool has_ids = false;
-  for (int c = 0; c < spec.nchannels; ++c) has_ids = has_ids || spec.channelformat(c) == TypeDesc::UINT;
-  if (!input.read_image(0, 0, 0, spec.nchannels, TypeDesc::FLOAT, read.values.data()))
+  FilePixels pixels;
+  pixels.count = static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height);
+  pixels.stride = spec.pixel_bytes(true);
+  pixels.bytes.resize(pixels.count * pixels.stride);
+  if (!input.read_image(0, 0, 0, spec.nchannels, TypeDesc::UNKNOWN, pixels.bytes.data()))
     fail_read(file, input.geterror());
-  if (!has_ids) return read;
-  read.ids.resize(read.values.size());
-  const OIIO::stride_t stride = static_cast<OIIO::stride_t>(read.channels * sizeof(std::uint32_t));
-  for (int c = 0; c < spec.nchannels; ++c)
-    if (spec.channelformat(c) == TypeDesc::UINT &&
-        !input.read_image(0, 0, c, c + 1, TypeDesc::UINT, read.ids.data() + c, stride))
-      fail_read(file, input.geterror());
-  return read;
+  return pixels;
+}
+
+// One channel of all pixels as T: float for values (integers scaled to [0,1]), uint32 for ids.
+template <class T>
+std::vector<T> channel_values(const OIIO::ImageSpec& spec, const FilePixels& pixels, int channel) {
+  const TypeDesc type = spec.channelformat(channel);
+  const std::size_t offset = spec.pixel_bytes(0, channel, true);
+  std::vector<std::byte> stored(pixels.count * type.size());
+  for (std::size_t p = 0; p < pixels.count; ++p)
+    std::memcpy(&stored[p * type.size()], &pixels.bytes[p * pixels.stride + offset], type.size());
+  std::vector<T> values(pixels.count);
+  OIIO::convert_types(type, stored.data(), OIIO::BaseTypeFromC<T>::value, values.data(),
+                      static_cast<int>(pixels.count));
+  return values;
 }
 
 template <class T>
-std::vector<T> pick_channels(const std::vector<T>& from, const std::vector<FileChannel>& layer,
-                             std::size_t channels) {
-  std::vector<T> picked;
-  picked.reserve(from.size() / channels * layer.size());
-  for (std::size_t at = 0; at < from.size(); at += channels)
-    for (const FileChannel& channel : layer)
-      picked.push_back(from[at + static_cast<std::size_t>(channel.index)]);
-  return picked;
+std::vector<T> layer_values(const OIIO::ImageSpec& spec, const FilePixels& pixels,
+                            const std::vector<FileChannel>& places) {
+  std::vector<T> interleaved(pixels.count * places.size());
+  for (std::size_t c = 0; c < places.size(); ++c) {
+    const std::vector<T> values = channel_values<T>(spec, pixels, places[c].index);
+    for (std::size_t p = 0; p < pixels.count; ++p) interleaved[p * places.size() + c] = values[p];
+  }
+  return interleaved;
 }
 
-Layer make_layer(const std::vector<FileChannel>& places, const FilePixels& read) {
+Layer make_layer(const OIIO::ImageSpec& spec, const FilePixels& pixels,
+                 const std::vector<FileChannel>& places) {
   Layer layer;
   layer.name = places.front().layer;
   for (const FileChannel& place : places) layer.channels.push_back(place.channel);
   if (places.front().id)
-    layer.ids = pick_channels(read.ids, places, read.channels);
+    layer.ids = layer_values<std::uint32_t>(spec, pixels, places);
   else
-    layer.values = pick_channels(read.values, places, read.channels);
+    layer.values = layer_values<float>(spec, pixels, places);
   return layer;
 }
 
@@ -348,7 +349,7 @@ const Layer* Image::find(const std::string& layer_name) const {
 }
 
 void write_image(const Image& image, const fs::path& file, const ToneMap& tone) {
-  use_one_thread();
+  limit_threads();
   const Format format = format_of(file);
   check_sizes(image, file);
   write_file_atomically(
@@ -356,7 +357,7 @@ void write_image(const Image& image, const fs::path& file, const ToneMap& tone) 
 }
 
 Image read_image(const fs::path& file) {
-  use_one_thread();
+  limit_threads();
   std::error_code error;
   if (!fs::exists(file, error)) fail_read(file, "there is no such file");
   if (!fs::is_regular_file(file, error)) fail_read(file, "it is not a regular file");
@@ -366,12 +367,12 @@ Image read_image(const fs::path& file) {
   if (!input) fail_read(file, OIIO::geterror());
   const OIIO::ImageSpec& spec = input->spec();
   check_readable(spec, file);
-  const FilePixels read = read_pixels(*input, file);
+  const FilePixels pixels = read_pixels(*input, file);
 
   Image image;
   image.width = spec.width;
   image.height = spec.height;
-  for (const auto& places : group_layers(spec)) image.layers.push_back(make_layer(places, read));
+  for (const auto& places : group_layers(spec)) image.layers.push_back(make_layer(spec, pixels, places));
   if (image.layers.front().name.empty() && !image.layers.front().values.empty()) {
     if (holds_srgb(spec)) decode_srgb(image.layers.front());
     expand_gray(image.layers.front());
