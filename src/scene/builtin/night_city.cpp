@@ -1,6 +1,7 @@
 // `night-city`: streets at night lit by nothing but tens of thousands of local lights: windows, shop fronts,
-// street lamps, neon lettering, swinging strings of bulbs, drifting lanterns and traffic. The budget `lights`
-// is shared out over the kinds; windows take what the others leave, so that the total comes near it.
+// street lamps, neon lettering, swinging strings of bulbs, wall lanterns, drifting kites and traffic. The
+// budget `lights` is shared out over the kinds; windows take what the others leave, so that the total comes
+// near it.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,10 +19,11 @@ namespace {
 
 constexpr float kLot = 56, kStreet = 16, kPitch = kLot + kStreet;  // metres
 constexpr float kHalfRoad = 5.2f, kCurb = 0.15f;
-constexpr float kPeriod = 8;  // seconds
-constexpr float kBulbShare = 0.28f, kNeonShare = 0.22f, kLampShare = 0.04f;
+constexpr float kPeriod = 8;        // seconds
+constexpr vec3 kBlackMetal(0.02f);  // what stands right beside lights
+constexpr float kBulbShare = 0.22f, kNeonShare = 0.12f, kLampShare = 0.04f, kLanternShare = 0.3f;
 constexpr std::size_t kMostLamps = 3000;
-enum Purpose : std::uint32_t { kPlan, kWindowColor, kBulb, kSign, kTraffic, kLantern, kStains };
+enum Purpose : std::uint32_t { kPlan, kWindowColor, kGlowColor, kBulb, kSign, kTraffic, kKite, kStains };
 
 // The grid of streets. Street k runs along x or z at line(k); the middle one along z is where the camera
 // stands.
@@ -32,7 +34,7 @@ struct Plan {
   int streets() const { return blocks + 1; }
   float lo() const { return line(0); }
   float hi() const { return line(blocks); }
-  float camera_z() const { return kPitch - 11; }  // just past a crossing
+  float camera_z() const { return kPitch - 18.5f; }  // past a crossing
 };
 
 struct City {
@@ -142,8 +144,7 @@ void add_block(City& city, int i, int j, WallBuilders& walls) {
       shape.bay = random.uniform(2.9f, 4.2f);
       shape.pilasters = random.chance(0.6f);
       shape.bands = !shape.pilasters || random.chance(0.5f);
-      const bool main_street = std::min(std::abs(shape.lo.x), std::abs(shape.hi.x)) < kStreet;
-      shape.weight = random.uniform(0.4f, 1.6f) * (main_street ? 2.0f : 1.0f);
+      shape.weight = random.uniform(0.4f, 1.6f);
       shape.panes_across = 1 + random.integer(2);
       shape.panes_down = 1 + random.integer(2);
       MeshBuilder& builder = walls[static_cast<std::size_t>(random.integer(static_cast<int>(walls.size())))];
@@ -179,9 +180,9 @@ void add_buildings(City& city) {
 
 // The last two are for shops.
 constexpr std::array<vec3, 9> kWindowRadiance = {
-    vec3(1.0f, 0.6f, 0.24f),  vec3(0.6f, 0.36f, 0.14f), vec3(1.1f, 0.75f, 0.38f),
-    vec3(0.6f, 0.6f, 0.56f),  vec3(0.35f, 0.2f, 0.08f), vec3(0.12f, 0.24f, 0.55f),
-    vec3(0.5f, 0.24f, 0.08f), vec3(1.3f, 0.9f, 0.42f),  vec3(0.8f, 0.9f, 1.0f)};
+    vec3(0.65f, 0.39f, 0.16f),  vec3(0.39f, 0.23f, 0.091f), vec3(0.72f, 0.49f, 0.25f),
+    vec3(0.39f, 0.39f, 0.36f),  vec3(0.23f, 0.13f, 0.052f), vec3(0.078f, 0.16f, 0.36f),
+    vec3(0.33f, 0.16f, 0.052f), vec3(0.85f, 0.59f, 0.27f),  vec3(0.52f, 0.59f, 0.65f)};
 
 // Lights windows of together about `triangles`; panes are cut finer when there are too few.
 void add_windows(City& city, std::size_t triangles) {
@@ -223,19 +224,19 @@ struct LampModel {
 // Origin at the foot; the arm reaches along +x over the road.
 LampModel add_lamp_model(Scene& scene) {
   MeshBuilder builder;
-  builder.cylinder(vec3(0), vec3(0, 6.3f, 0), 0.09f, 0.06f, 8);
-  builder.cylinder(vec3(-0.02f, 6.25f, 0), vec3(1.5f, 6.6f, 0), 0.05f, 0.045f, 6);
-  builder.box(vec3(1.3f, 6.56f, -0.2f), vec3(2.1f, 6.72f, 0.2f));
+  builder.cylinder(vec3(0), vec3(0, 4.8f, 0), 0.09f, 0.06f, 8);
+  builder.cylinder(vec3(-0.02f, 4.75f, 0), vec3(1.5f, 5.1f, 0), 0.05f, 0.045f, 6);
+  builder.box(vec3(1.3f, 5.06f, -0.2f), vec3(2.1f, 5.2f, 0.2f));
   LampModel model{};
   model.post =
       add_mesh(scene, builder, "lamp post", add_surface(scene, "lamp post", vec3(0.1f, 0.11f, 0.12f), 0.5f));
   std::vector<vec3> rim;
   for (int k = 0; k < 8; ++k)  // counter-clockwise seen from below
-    rim.emplace_back(1.7f + 0.3f * cosine(kPi * static_cast<float>(k) / 4), 6.55f,
+    rim.emplace_back(1.7f + 0.3f * cosine(kPi * static_cast<float>(k) / 4), 5.05f,
                      0.17f * sine(kPi * static_cast<float>(k) / 4));
   builder.polygon(rim);
   model.lens_triangles = builder.triangle_count();
-  model.lens = add_mesh(scene, builder, "lamp lens", add_emitter(scene, "lamp lens", vec3(380, 245, 115)));
+  model.lens = add_mesh(scene, builder, "lamp lens", add_emitter(scene, "lamp lens", vec3(150, 97, 45)));
   return model;
 }
 
@@ -262,80 +263,116 @@ void add_lamps(City& city, std::size_t triangles) {
           }
 }
 
+// --- wall lanterns
+
+// Small globes on brackets along every street wall: pools of light a few metres wide.
+void add_wall_lanterns(City& city, std::size_t triangles, int subdivisions) {
+  constexpr float kHeight = 2.9f, kReach = 0.75f, kRadius = 0.11f;
+  constexpr std::array<vec3, 3> kGlow = {vec3(30, 19, 8), vec3(30, 14, 4), vec3(24, 22, 17)};
+  MeshBuilder brackets;
+  std::array<MeshBuilder, kGlow.size()> globes;
+  float length = 0;
+  for (const Facade& wall : city.facades) length += wall.width;
+  const float each = 20 * std::pow(4.0f, static_cast<float>(subdivisions));
+  const float spacing = length * each / static_cast<float>(triangles);
+  float next = 0.5f * spacing;  // from the left end of the wall, carried from wall to wall
+  for (const Facade& wall : city.facades) {
+    RandomStream random(city.plan.seed, kGlowColor, static_cast<std::uint32_t>(&wall - city.facades.data()));
+    const auto color = static_cast<std::size_t>(random.integer(kGlow.size()));
+    const vec3 left = wall.origin + vec3(0, kHeight, 0);
+    for (; next < wall.width; next += spacing) {
+      const vec3 globe = left + wall.along * next + wall.normal * kReach;
+      globes[color].icosphere(globe, kRadius, subdivisions);
+      brackets.cylinder(globe - wall.normal * kReach + vec3(0, 0.3f, 0), globe + vec3(0, 0.3f, 0), 0.02f,
+                        0.02f, 4);
+      brackets.cylinder(globe + vec3(0, 0.3f, 0), globe + vec3(0, kRadius, 0), 0.01f, 0.01f, 4);
+    }
+    next -= wall.width;
+  }
+  add_static(city.scene, brackets, "brackets", add_surface(city.scene, "bracket", kBlackMetal, 0.6f, 1));
+  for (std::size_t c = 0; c < globes.size(); ++c) {
+    const std::string name = "wall lanterns " + std::to_string(c + 1);
+    city.emissive += globes[c].triangle_count();
+    if (!globes[c].empty()) add_static(city.scene, globes[c], name, add_emitter(city.scene, name, kGlow[c]));
+  }
+}
+
 // --- strings of bulbs
 // -----------------------------------------------------------------------------------------
 
-constexpr std::array<vec3, 6> kBulbRadiance = {vec3(26, 13, 2.7f), vec3(27, 0.85f, 0.51f),
-                                               vec3(1, 22, 1.7f),  vec3(0.85f, 3.7f, 37),
-                                               vec3(24, 1, 19),    vec3(24, 16, 0.85f)};
-constexpr int kBulbsPerColor = 3;
-constexpr float kBulbRadius = 0.15f;
+constexpr std::array<vec3, 6> kBulbRadiance = {vec3(31, 16, 3.2f), vec3(32, 1, 0.61f), vec3(1.2f, 26, 2),
+                                               vec3(1, 4.4f, 44),  vec3(29, 1.2f, 23), vec3(29, 19, 1)};
+constexpr int kBulbsPerColor = 6, kBulbsPerString = 3 * kBulbsPerColor;
+constexpr float kBulbRadius = 0.13f;
+constexpr float kMainStreetShare = 0.3f;  // of strings and signs
 
 struct StringModel {
-  std::vector<int> meshes;  // wire, then one a colour
+  std::vector<int> meshes;  // wire, then three colours
   std::size_t triangles = 0;
 };
-// Hangs along +x from the origin to (kStreet,0,0).
-StringModel add_string_model(Scene& scene, int subdivisions) {
+// Hang along +x from the origin to (kStreet,0,0); every second string has the other three colours.
+std::array<StringModel, 2> add_string_models(Scene& scene, int subdivisions) {
   const auto hang = [](float s) { return vec3(kStreet * s, -4.4f * s * (1 - s), 0); };
-  StringModel model;
   MeshBuilder builder;
   constexpr int kPieces = 16;
   for (int i = 0; i < kPieces; ++i)
     builder.cylinder(hang(static_cast<float>(i) / kPieces), hang(static_cast<float>(i + 1) / kPieces), 0.012f,
                      0.012f, 4, false);
-  model.meshes.push_back(add_mesh(scene, builder, "wire", add_surface(scene, "wire", vec3(0.04f))));
-  const int count = kBulbsPerColor * static_cast<int>(kBulbRadiance.size());
+  const int wire = add_mesh(scene, builder, "wire", add_surface(scene, "wire", kBlackMetal, 0.6f, 1));
+  std::array<StringModel, 2> models = {StringModel{{wire}}, StringModel{{wire}}};
   for (std::size_t c = 0; c < kBulbRadiance.size(); ++c) {
-    for (int k = static_cast<int>(c); k < count; k += static_cast<int>(kBulbRadiance.size()))
-      builder.icosphere(hang((static_cast<float>(k) + 0.5f) / static_cast<float>(count)) - vec3(0, 0.13f, 0),
-                        0.085f, subdivisions);
-    model.triangles += builder.triangle_count();
+    for (int k = static_cast<int>(c % 3); k < kBulbsPerString; k += 3)
+      builder.icosphere(
+          hang(glm::mix(0.1f, 0.9f, static_cast<float>(k) / (kBulbsPerString - 1))) - vec3(0, 0.25f, 0),
+          kBulbRadius, subdivisions);
+    models[c / 3].triangles += builder.triangle_count();
     const std::string name = "bulbs " + std::to_string(c + 1);
-    model.meshes.push_back(add_mesh(scene, builder, name, add_emitter(scene, name, kBulbRadiance[c])));
+    models[c / 3].meshes.push_back(
+        add_mesh(scene, builder, name, add_emitter(scene, name, kBulbRadiance[c])));
   }
-  return model;
+  return models;
 }
 
 struct StringSpot {
   vec3 anchor;
   bool along_x;  // spans a street that runs along z
 };
-// Places for strings, the main street first, then the others from the camera outwards.
-std::vector<StringSpot> string_spots(const Plan& plan, float spacing) {
+// `count` places for strings, evenly over the main street and, apart from that, over all the others.
+std::vector<StringSpot> string_spots(const Plan& plan, int count) {
   std::vector<StringSpot> spots;
-  const auto near_line = [&](float at) {
-    const float offset = (at - plan.lo()) / kPitch;
-    return std::abs(offset - std::round(offset)) * kPitch < kStreet / 2 + 0.5f;
+  const auto fill_block = [&](bool along_z, float line, float from, int strings) {
+    for (int i = 0; i < strings; ++i) {
+      const float at =
+          from + 0.5f * kStreet + kLot * (static_cast<float>(i) + 0.5f) / static_cast<float>(strings);
+      spots.push_back(along_z ? StringSpot{vec3(line - kStreet / 2, 0, at), true}
+                              : StringSpot{vec3(at, 0, line + kStreet / 2), false});
+    }
   };
-  const auto add_street = [&](bool along_z, float line) {
-    for (float at = plan.hi() - 4; at > plan.lo(); at -= spacing)
-      if (!near_line(at))
-        spots.push_back(along_z ? StringSpot{vec3(line - kStreet / 2, 0, at), true}
-                                : StringSpot{vec3(at, 0, line + kStreet / 2), false});
-  };
-  std::vector<int> order;
-  for (int k = 0; k < plan.streets(); ++k) order.push_back(k);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](int a, int b) { return std::abs(plan.line(a)) < std::abs(plan.line(b)); });
-  for (const int k : order) {
-    add_street(true, plan.line(k));
-    add_street(false, plan.line(k));
-  }
+  const auto portion = [](int total, int i, int n) { return total * (i + 1) / n - total * i / n; };
+  const int main = static_cast<int>(kMainStreetShare * static_cast<float>(count));
+  const int blocks = (2 * plan.streets() - 1) * plan.blocks;
+  int block = 0;
+  for (const bool along_z : {true, false})
+    for (int k = 0; k < plan.streets(); ++k)
+      for (int b = 0; b < plan.blocks; ++b) {
+        const bool main_street = along_z && k == plan.blocks / 2;
+        const int strings =
+            main_street ? portion(main, b, plan.blocks) : portion(count - main, block++, blocks);
+        fill_block(along_z, plan.line(k), plan.line(b), strings);
+      }
   return spots;
 }
 
 void add_strings(City& city, std::size_t triangles, int subdivisions) {
-  const StringModel model = add_string_model(city.scene, subdivisions);
-  const std::size_t wanted = std::max<std::size_t>(1, triangles / model.triangles);
-  float spacing = 7;
-  std::vector<StringSpot> spots = string_spots(city.plan, spacing);
-  while (spots.size() < wanted) spots = string_spots(city.plan, spacing *= 0.8f);
-  for (std::size_t i = 0; i < wanted; ++i) {
-    RandomStream random(city.plan.seed, kBulb, static_cast<std::uint32_t>(i));
-    const vec3 anchor = spots[i].anchor + vec3(0, random.uniform(6.2f, 7.6f), 0);
-    const vec4 base = axis_angle(vec3(0, 1, 0), spots[i].along_x ? 0.0f : kPi / 2);
-    const int stand = add_node(city.scene, "string", {}, anchor, base);
+  const std::array<StringModel, 2> models = add_string_models(city.scene, subdivisions);
+  const int wanted = std::max(1, static_cast<int>(triangles / models[0].triangles));
+  std::uint32_t index = 0;
+  for (const StringSpot& spot : string_spots(city.plan, wanted)) {
+    RandomStream random(city.plan.seed, kBulb, index);
+    const StringModel& model = models[index++ % 2];
+    const vec3 anchor = spot.anchor + vec3(0, random.uniform(6.2f, 7.6f), 0);
+    const int stand =
+        add_node(city.scene, "string", {}, anchor, axis_angle(vec3(0, 1, 0), spot.along_x ? 0.0f : kPi / 2));
     const int swing = add_node(city.scene, "swinging bulbs", model.meshes, vec3(0), vec4(0, 0, 0, 1), stand);
     const float phase = random.uniform(), angle = random.uniform(0.15f, 0.4f);
     const float beats = static_cast<float>(2 + random.integer(2));
@@ -349,9 +386,8 @@ void add_strings(City& city, std::size_t triangles, int subdivisions) {
 // --- neon signs
 // -----------------------------------------------------------------------------------------------
 
-constexpr std::array<vec3, 6> kNeonRadiance = {vec3(33, 0.75f, 1.7f), vec3(0.75f, 6, 39),
-                                               vec3(0.6f, 27, 7.5f),  vec3(30, 1, 24),
-                                               vec3(33, 9, 0.45f),    vec3(0.9f, 22, 27)};
+constexpr std::array<vec3, 6> kNeonRadiance = {vec3(46, 1, 2.4f),  vec3(1, 8.4f, 55),   vec3(0.84f, 38, 10),
+                                               vec3(42, 1.4f, 34), vec3(46, 13, 0.63f), vec3(1.3f, 31, 38)};
 constexpr std::array<std::string_view, 14> kWords = {"HOTEL",   "CAFE",  "BAR",     "JAZZ",  "OPEN",
                                                      "CINEMA",  "CLUB",  "NOODLES", "PIZZA", "DANCE",
                                                      "KARAOKE", "BOOKS", "TAXI",    "LUX"};
@@ -366,14 +402,14 @@ void add_blade_sign(const Facade& wall, float at, std::string_view word, float h
   // Frame of the board: x out of the wall, y up, z against the wall's direction.
   const mat4 frame(vec4(wall.normal, 0), vec4(0, 1, 0, 0), vec4(-wall.along, 0), vec4(foot, 1));
   boards.set_transform(frame);
-  boards.box(vec3(0.35f, bottom - 0.2f, -0.06f), vec3(0.35f + width, bottom + size.y + 0.2f, 0.06f));
-  boards.box(vec3(-0.1f, bottom + 0.3f, -0.03f), vec3(0.36f, bottom + 0.4f, 0.03f));
+  boards.box(vec3(0.7f, bottom - 0.2f, -0.06f), vec3(0.7f + width, bottom + size.y + 0.2f, 0.06f));
+  boards.box(vec3(-0.1f, bottom + 0.3f, -0.03f), vec3(0.71f, bottom + 0.4f, 0.03f));
   boards.set_transform(mat4(1));
   tubes.set_transform(frame);
-  add_neon_word(tubes, word, vec3(0.5f, bottom, 0.13f), height, true);
+  add_neon_word(tubes, word, vec3(0.85f, bottom, 0.2f), height, true);
   const mat4 other(vec4(-wall.normal, 0), vec4(0, 1, 0, 0), vec4(wall.along, 0), vec4(foot, 1));
   tubes.set_transform(other);
-  add_neon_word(tubes, word, vec3(-0.5f - size.x, bottom, 0.13f), height, true);
+  add_neon_word(tubes, word, vec3(-0.85f - size.x, bottom, 0.2f), height, true);
   tubes.set_transform(mat4(1));
 }
 
@@ -389,7 +425,7 @@ void add_front_sign(const Facade& wall, float at, std::string_view word, float h
              vec3(left + size.x + 0.25f, bottom + size.y + 0.2f, 0.4f));
   boards.set_transform(mat4(1));
   tubes.set_transform(frame);
-  add_neon_word(tubes, word, vec3(left, bottom, 0.48f), height, false);
+  add_neon_word(tubes, word, vec3(left, bottom, 0.56f), height, false);
   tubes.set_transform(mat4(1));
 }
 
@@ -398,34 +434,43 @@ struct SignSpot {
   float at;
   float order;
 };
-// Spots along street walls, the ones near the camera's street tending to come first.
-std::vector<SignSpot> sign_spots(const City& city) {
-  std::vector<SignSpot> spots;
+// Spots along street walls: on the main street the ones before the camera come first, elsewhere the order is
+// random.
+struct SignSpots {
+  std::vector<SignSpot> main_street, elsewhere;
+};
+SignSpots sign_spots(const City& city) {
+  SignSpots spots;
   for (std::size_t f = 0; f < city.facades.size(); ++f) {
     const Facade& wall = city.facades[f];
     const vec3 front = wall.origin + wall.along * (wall.width / 2) + wall.normal * (kStreet / 2);
-    const float offset = glm::dot(front, glm::abs(wall.normal)) / kPitch - city.plan.line(0) / kPitch;
-    if (std::abs(offset - std::round(offset)) > 0.01f) continue;  // looks into the block
-    const bool main_street = std::abs(wall.normal.x) > 0.5f && std::abs(front.x) < 1;
+    const bool main_street =
+        std::abs(wall.normal.x) > 0.5f && std::abs(front.x - city.plan.line(city.plan.blocks / 2)) < 1;
     RandomStream random(city.plan.seed, kSign, static_cast<std::uint32_t>(f));
-    // First along the main street before the camera, then everywhere.
-    const float ahead = city.plan.camera_z() - front.z;
-    const float first = main_street && ahead > 0 ? 0.1f * ahead / kPitch : 1;
-    for (float at = 2.5f; at < wall.width - 2; at += 5)
-      spots.push_back({f, at, first + 0.25f * random.uniform()});
+    for (float at = 2.5f; at < wall.width - 2; at += 5) {
+      const float ahead = city.plan.camera_z() - (wall.origin + wall.along * at).z;
+      const float distance = ahead > 0 ? ahead / kPitch : 10;
+      if (main_street)
+        spots.main_street.push_back({f, at, distance + 2 * random.uniform()});
+      else
+        spots.elsewhere.push_back({f, at, random.uniform()});
+    }
   }
-  std::stable_sort(spots.begin(), spots.end(),
-                   [](const SignSpot& a, const SignSpot& b) { return a.order < b.order; });
+  const auto earlier = [](const SignSpot& a, const SignSpot& b) { return a.order < b.order; };
+  std::stable_sort(spots.main_street.begin(), spots.main_street.end(), earlier);
+  std::stable_sort(spots.elsewhere.begin(), spots.elsewhere.end(), earlier);
   return spots;
 }
 
-void add_signs(City& city, std::size_t triangles) {
-  NeonBuilders tubes;
-  MeshBuilder boards;
-  std::size_t placed = 0, index = 0;
-  for (const SignSpot& spot : sign_spots(city)) {
+// Places signs at `spots` until their tubes come to `triangles`; returns how many they are.
+std::size_t place_signs(const City& city, const std::vector<SignSpot>& spots, std::size_t triangles,
+                        NeonBuilders& tubes, MeshBuilder& boards) {
+  std::size_t placed = 0;
+  for (const SignSpot& spot : spots) {
     if (placed >= triangles) break;
-    RandomStream random(city.plan.seed, kSign, static_cast<std::uint32_t>(0x10000 + index++));
+    RandomStream random(
+        city.plan.seed, kSign,
+        static_cast<std::uint32_t>(0x100000 + spot.facade * 256) + static_cast<std::uint32_t>(spot.at));
     const std::string_view word = kWords[static_cast<std::size_t>(random.integer(kWords.size()))];
     MeshBuilder& color = tubes[static_cast<std::size_t>(random.integer(static_cast<int>(tubes.size())))];
     const std::size_t before = color.triangle_count();
@@ -436,13 +481,24 @@ void add_signs(City& city, std::size_t triangles) {
       add_front_sign(wall, spot.at, word, random.uniform(0.45f, 0.6f), color, boards);
     placed += color.triangle_count() - before;
   }
+  return placed;
+}
+
+void add_signs(City& city, std::size_t triangles) {
+  NeonBuilders tubes;
+  MeshBuilder boards;
+  const SignSpots spots = sign_spots(city);
+  const std::size_t main =
+      place_signs(city, spots.main_street,
+                  static_cast<std::size_t>(kMainStreetShare * static_cast<float>(triangles)), tubes, boards);
+  city.emissive +=
+      main + place_signs(city, spots.elsewhere, triangles - std::min(main, triangles), tubes, boards);
   for (std::size_t c = 0; c < tubes.size(); ++c) {
     const std::string name = "neon " + std::to_string(c + 1);
     if (!tubes[c].empty())
       add_static(city.scene, tubes[c], name, add_emitter(city.scene, name, kNeonRadiance[c]));
   }
-  add_static(city.scene, boards, "sign boards", add_surface(city.scene, "sign board", vec3(0.06f), 0.5f));
-  city.emissive += placed;
+  add_static(city.scene, boards, "sign boards", add_surface(city.scene, "sign board", kBlackMetal, 0.6f, 1));
 }
 
 // --- traffic
@@ -478,7 +534,7 @@ CarModel add_car_model(Scene& scene, const std::string& name, vec3 paint) {
     builder.quad(vec3(x, 0.62f, 2.16f), vec3(0.4f, 0, 0), vec3(0, 0.15f, 0));
   triangles += builder.triangle_count();
   const int tails =
-      add_mesh(scene, builder, "tail lamps", add_emitter(scene, "tail lamps", vec3(30, 1.2f, 0.8f)));
+      add_mesh(scene, builder, "tail lamps", add_emitter(scene, "tail lamps", vec3(10, 0.3f, 0.2f)));
   return {{body, dark, heads, tails}, triangles};
 }
 
@@ -522,26 +578,26 @@ void add_traffic(City& city) {
       }
 }
 
-// --- drifting lanterns
+// --- drifting kites
 // ----------------------------------------------------------------------------------------
 
 // Point lights below small dark kites that wander over the main street.
-void add_lanterns(City& city) {
+void add_kites(City& city) {
   MeshBuilder builder;
   builder.cylinder(vec3(0), vec3(0, 0.35f, 0), 0.3f, 0, 6);
-  const int kite = add_mesh(city.scene, builder, "kite", add_surface(city.scene, "kite", vec3(0.2f)));
+  const int kite = add_mesh(city.scene, builder, "kite", add_surface(city.scene, "kite", vec3(0.08f)));
   for (std::uint32_t i = 0; i < 24; ++i) {
-    RandomStream random(city.plan.seed, kLantern, i);
+    RandomStream random(city.plan.seed, kKite, i);
     const vec3 centre(random.uniform(-5, 5), random.uniform(8, 13),
                       glm::mix(city.plan.lo(), city.plan.camera_z(), random.uniform()));
     const float phase = random.uniform(), wide = random.uniform(0.6f, 2), deep = random.uniform(1, 3);
-    const int node = add_node(city.scene, "lantern", {kite}, centre);
+    const int node = add_node(city.scene, "kite", {kite}, centre);
     animate_translation(city.scene, node, kPeriod, 12, Interpolation::kCubicSpline, [=](float t) {
       const float a = 2 * kPi * (t + phase);
       return centre + vec3(wide * sine(a), 0.5f * sine(2 * a), deep * cosine(a));
     });
     PunctualLight light;
-    light.name = "lantern light";
+    light.name = "kite light";
     light.color = 0.6f * kBulbRadiance[i % kBulbRadiance.size()];
     add_light_node(city.scene, light, vec3(0, -0.7f, 0), vec4(0, 0, 0, 1), node);
   }
@@ -556,9 +612,11 @@ Scene make(const Parameters& parameters) {
   add_markings(city);
   add_buildings(city);
   add_traffic(city);
-  add_lanterns(city);
+  add_kites(city);
   add_lamps(city, share(kLampShare));
-  add_strings(city, share(kBulbShare), lights > 200000 ? 1 : 0);
+  const int subdivisions = lights > 500000 ? 1 : 0;  // of globes and bulbs
+  add_wall_lanterns(city, share(kLanternShare), subdivisions);
+  add_strings(city, share(kBulbShare), subdivisions);
   add_signs(city, share(kNeonShare));
   add_windows(city, lights > city.emissive ? lights - city.emissive : 0);
   const float z = city.plan.camera_z();
@@ -573,8 +631,8 @@ Definition night_city() {
   return {"night-city",
           "city streets at night: windows, lamps, neon, swinging bulbs, traffic; all lights local",
           true,
-          {{"lights", "40000", "emissive triangles, about (5000 to 4000000)", 5000, 4e6, false, {}},
-           {"blocks", "4", "city blocks a side (2 to 12)", 2, 12, false, {}},
+          {{"lights", "100000", "emissive triangles, about (5000 to 4000000)", 5000, 4e6, false, {}},
+           {"blocks", "6", "city blocks a side (2 to 12)", 2, 12, false, {}},
            seed_parameter()},
           make};
 }

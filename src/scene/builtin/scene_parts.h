@@ -12,8 +12,9 @@
 namespace lumigrove::builtin {
 
 int add_surface(Scene& scene, std::string name, vec3 base_color, float roughness = 1, float metallic = 0);
-// An emitter of `radiance` W/(sr m^2) that also reflects `base_color` diffusely.
-int add_emitter(Scene& scene, std::string name, vec3 radiance, vec3 base_color = vec3(0.2f));
+// An emitter of `radiance` W/(sr m^2) that also reflects `base_color` diffusely. Small hot sources stay
+// black: what they reflect of their neighbours drowns in their own light and would only cost samples.
+int add_emitter(Scene& scene, std::string name, vec3 radiance, vec3 base_color = vec3(0));
 int add_mesh(Scene& scene, MeshBuilder& builder, std::string name, int material);
 int add_node(Scene& scene, std::string name, std::vector<int> meshes, vec3 translation = vec3(0),
              vec4 rotation = vec4(0, 0, 0, 1), int parent = -1);
