@@ -55,6 +55,17 @@ struct World {
   SceneState state;
 };
 
+// So many triangles, out of every ray's way, that what moves is traced as instances.
+void add_bulk(World& world) {
+  Mesh mesh;
+  mesh.positions = {vec3(1000, 0, 0), vec3(1001, 0, 0), vec3(1000, 1, 0)};
+  mesh.triangles.assign(kMaxRebuiltSoup, uvec3(0, 1, 2));
+  MeshInstance instance;
+  instance.mesh = static_cast<int>(world.scene.meshes.size());
+  world.scene.meshes.push_back(mesh);
+  world.state.instances.push_back(instance);
+}
+
 World random_world(unsigned seed) {
   Random random(seed);
   World world;
@@ -150,24 +161,40 @@ void expect_agreement(const World& world, const Tracer& tracer, Coherence cohere
   EXPECT_GT(hit_count, 200);
 }
 
-TEST(Tracer, AgreesWithBruteForceOnInstancesMirroredScaledAndMoving) {
+TEST(Tracer, AgreesWithBruteForceOnMirroredAndScaledMeshes) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     const World world = random_world(seed);
+    EXPECT_TRUE(plan_trace(world.scene, world.state).instanced.empty());
     const Tracer tracer(world.scene, world.state);
     expect_agreement(world, tracer, Coherence::kCoherent, seed + 100);
     expect_agreement(world, tracer, Coherence::kIncoherent, seed + 200);
   }
 }
 
+TEST(Tracer, AgreesWithBruteForceOnInstances) {
+  World world = random_world(4);
+  World bulky = world;
+  add_bulk(bulky);
+  EXPECT_EQ(plan_trace(bulky.scene, bulky.state).instanced, (std::vector<std::uint32_t>{2, 5, 8}));
+  const Tracer tracer(bulky.scene, bulky.state);
+  expect_agreement(world, tracer, Coherence::kCoherent, 5);
+  expect_agreement(world, tracer, Coherence::kIncoherent, 6);
+}
+
 TEST(Tracer, AgreesWithBruteForceAfterAnUpdate) {
-  World world = random_world(7);
-  Tracer tracer(world.scene, world.state);
-  Random random(8);
-  for (MeshInstance& instance : world.state.instances) {
-    if (instance.moves) instance.to_world = random_map(random, false);
+  for (const bool instanced : {false, true}) {
+    World world = random_world(7), traced = world;
+    if (instanced) add_bulk(traced);
+    Tracer tracer(traced.scene, traced.state);
+    Random random(8);
+    for (std::size_t i = 0; i < world.state.instances.size(); ++i) {
+      MeshInstance& instance = world.state.instances[i];
+      if (instance.moves) instance.to_world = random_map(random, i % 2 == 0);
+      traced.state.instances[i].to_world = instance.to_world;
+    }
+    tracer.update(traced.state);
+    expect_agreement(world, tracer, Coherence::kCoherent, 9);
   }
-  tracer.update(world.state);
-  expect_agreement(world, tracer, Coherence::kCoherent, 9);
 }
 
 TEST(Tracer, RefusesTheStateOfAnotherScene) {
@@ -226,8 +253,10 @@ World leaf_over_floor(bool moves) {
 }
 
 TEST(Tracer, CutsHolesWhereAlphaIsBelowTheCutoff) {
-  for (const bool moves : {false, true}) {
-    const World world = leaf_over_floor(moves);
+  for (const bool instanced : {false, true}) {
+    World world = leaf_over_floor(instanced);
+    if (instanced) add_bulk(world);
+    ASSERT_EQ(plan_trace(world.scene, world.state).instanced.size(), instanced ? 1u : 0u);
     const Tracer tracer(world.scene, world.state);
     std::vector<Ray> down;
     for (int i = 0; i < 20; ++i) {
@@ -265,7 +294,8 @@ TEST(Tracer, MaskUsesMaterialAndVertexAlpha) {
 }
 
 TEST(Tracer, IgnoresRaysThatAreNotToBeTraced) {
-  const World world = leaf_over_floor(true);
+  World world = leaf_over_floor(true);
+  add_bulk(world);
   const Tracer tracer(world.scene, world.state);
   const Ray good{vec3(0.7f, 0.3f, 2), 0, vec3(0, 0, -1), kInfinity};
   std::vector<Ray> rays(16, good);
@@ -308,6 +338,7 @@ TEST(Tracer, SkipsBrokenTrianglesAndTransforms) {
     world.state.instances.push_back(instance);
   }
   world.state.instances[2].to_world = mat4x3(0.0f);  // moving and collapsed to a point
+  add_bulk(world);
   const Tracer tracer(world.scene, world.state);
   const std::vector<Ray> rays = {{vec3(0.7f, 0.3f, 3), 0, vec3(0, 0, -1), kInfinity},
                                  {vec3(0.3f, 0.7f, 3), 0, vec3(0, 0, -1), kInfinity},

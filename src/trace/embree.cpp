@@ -1,11 +1,12 @@
-// Embree behind the tracing seam. Two Embree scenes answer every ray one after the other: a soup of baked
-// world-space triangles, and one level of instances for what moves and for large meshes used several times;
-// so a moving scene rebuilds only the second.
+// Embree behind the tracing seam. Up to two Embree scenes answer every ray one after the other: a soup of
+// baked world-space triangles, and one level of instances for what moves in large scenes and for large meshes
+// used several times.
 #include <tbb/parallel_for.h>
 
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <mutex>
 #include <string>
 #include <unordered_map>
 
@@ -73,9 +74,8 @@ DevicePointer make_device() {
 ScenePointer make_scene(RTCDevice device) {
   ScenePointer scene(rtcNewScene(device));
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
-  // Watertight. Without it about 5 in a million rays slip between two triangles of a tessellated sphere; it
-  // costs 3 to 15 percent of the time of a ray.
-  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+  // Not robust: in 15 million primary rays of the built-in city that changes nine hits, but every shadow ray
+  // would take 10 to 15 percent longer.
   return scene;
 }
 
@@ -114,8 +114,26 @@ bool is_invertible(const mat4x3& m) {
   return determinant != 0 && is_finite(1 / determinant) && is_finite(m[3]);
 }
 
+// The rays of one block that are to be traced. Packing just those keeps packets full where many samples are
+// dead.
+class TraceableRays {
+ public:
+  explicit TraceableRays(std::span<const Ray> rays) {
+    for (std::uint32_t i = 0; i < rays.size(); ++i) {
+      indices_[count_] = i;
+      count_ += is_traceable(rays[i]) ? 1u : 0u;
+    }
+  }
+  std::size_t count() const { return count_; }
+  std::size_t operator[](std::size_t i) const { return indices_[i]; }
+
+ private:
+  std::array<std::uint32_t, kBlock + 1> indices_;
+  std::size_t count_ = 0;
+};
+
 // Packets keep what does not change from one packet to the next: time, mask, flags.
-template <class PacketRay, std::size_t kWidth>
+template <int kWidth, class PacketRay>
 void prepare(PacketRay& packet) {
   for (std::size_t i = 0; i < kWidth; ++i) {
     packet.time[i] = 0;
@@ -125,12 +143,13 @@ void prepare(PacketRay& packet) {
   }
 }
 
-// Loads up to kWidth rays; lanes without a traceable ray are switched off.
-template <class PacketRay, std::size_t kWidth>
-void load(std::span<const Ray> rays, PacketRay& packet, std::array<int, kWidth>& valid) {
+// Rays number `first` and following; lanes beyond the last ray repeat it and are switched off.
+template <int kWidth, class PacketRay>
+void load(std::span<const Ray> rays, const TraceableRays& traceable, std::size_t first, PacketRay& packet,
+          std::array<int, kWidth>& valid) {
   for (std::size_t i = 0; i < kWidth; ++i) {
-    const Ray& ray = rays[std::min(i, rays.size() - 1)];
-    valid[i] = i < rays.size() && is_traceable(ray) ? -1 : 0;
+    const Ray& ray = rays[traceable[std::min(first + i, traceable.count() - 1)]];
+    valid[i] = first + i < traceable.count() ? -1 : 0;
     packet.org_x[i] = ray.origin.x;
     packet.org_y[i] = ray.origin.y;
     packet.org_z[i] = ray.origin.z;
@@ -142,35 +161,24 @@ void load(std::span<const Ray> rays, PacketRay& packet, std::array<int, kWidth>&
   }
 }
 
-RTCRay make_ray(const Ray& ray) {
-  RTCRay out;
-  out.org_x = ray.origin.x;
-  out.org_y = ray.origin.y;
-  out.org_z = ray.origin.z;
-  out.tnear = start(ray);
-  out.dir_x = ray.direction.x;
-  out.dir_y = ray.direction.y;
-  out.dir_z = ray.direction.z;
-  out.time = 0;
-  out.tfar = ray.tmax;
-  out.mask = embree::kMaskAll;
-  out.id = 0;
-  out.flags = 0;
-  return out;
-}
-
 }  // namespace
 
 struct Tracer::Impl {
-  Impl(const Scene& scene, const SceneState& state);
+  Impl(const Scene& traced_scene, const SceneState& state);
 
-  void build_baked(const Scene& scene, const SceneState& state, const TracePlan& plan);
-  void attach_opaque(const Scene& scene, const SceneState& state, const std::vector<std::uint32_t>& baked);
-  void attach_masked(const Scene& scene, const SceneState& state, std::uint32_t instance);
-  void build_instanced(const Scene& scene, const SceneState& state, const std::vector<std::uint32_t>& ids);
-  RTCScene shared_scene(const Scene& scene, int mesh);
+  void build_baked(const SceneState& state);
+  void attach_opaque(const SceneState& state);
+  void attach_masked(const SceneState& state, std::uint32_t instance);
+  void build_instanced(const SceneState& state);
+  RTCScene shared_scene(int mesh);
   void place_instances(const SceneState& state);
+  void update(const SceneState& state);
   void let_filter_cut(RTCGeometry geometry, int mesh);
+
+  void keep(std::span<const Ray> rays, std::vector<Ray>& record) {
+    const std::lock_guard lock(recorder_mutex);
+    record.insert(record.end(), rays.begin(), rays.end());
+  }
 
   TriangleId name_hit(unsigned geometry, unsigned primitive, unsigned embree_instance) const;
 
@@ -178,9 +186,9 @@ struct Tracer::Impl {
   void closest_packets(std::span<const Ray> rays, std::span<Hit> hits, bool coherent) const;
   template <int kWidth>
   void occluded_packets(std::span<const Ray> rays, std::span<std::uint8_t> occluded, bool coherent) const;
-  void closest_singly(std::span<const Ray> rays, std::span<Hit> hits) const;
-  void occluded_singly(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const;
 
+  const Scene& scene;
+  TracePlan plan;
   std::atomic<ssize_t> embree_bytes = 0;
   DevicePointer device;
   bool wide = false;  // packets of 16 are native, otherwise 8
@@ -192,37 +200,38 @@ struct Tracer::Impl {
   std::vector<TriangleId> soup;                // geometry 0 of `baked`, when there is opaque geometry
   std::vector<std::uint32_t> baked_instances;  // by geometry id of `baked`; unused for the soup
   std::unordered_map<int, ScenePointer> shared;
-  std::vector<std::uint32_t> instanced_ids;  // by geometry id of `instanced`
   std::vector<GeometryPointer> instance_geometries;
   std::vector<int> mesh_of_instance;  // of the first state, to check later ones
 
   RayRecorder* recorder = nullptr;
+  std::mutex recorder_mutex;
 };
 
-Tracer::Impl::Impl(const Scene& scene, const SceneState& state) : device(make_device()), arrays(scene) {
+Tracer::Impl::Impl(const Scene& traced_scene, const SceneState& state)
+    : scene(traced_scene), plan(plan_trace(scene, state)), device(make_device()), arrays(scene) {
   rtcSetDeviceMemoryMonitorFunction(device.get(), count_bytes, &embree_bytes);
   wide = rtcGetDeviceProperty(device.get(), RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0;
   view = arrays.view();
   for (const MeshView& mesh : arrays.meshes) masked_meshes.push_back({&view, &mesh});
   for (const MeshInstance& instance : state.instances) mesh_of_instance.push_back(instance.mesh);
-  const TracePlan plan = plan_trace(scene, state);
-  build_baked(scene, state, plan);
-  build_instanced(scene, state, plan.instanced);
+  build_baked(state);
+  build_instanced(state);
   throw_on_error(device.get());
 }
 
-void Tracer::Impl::build_baked(const Scene& scene, const SceneState& state, const TracePlan& plan) {
+void Tracer::Impl::build_baked(const SceneState& state) {
   if (plan.baked.empty() && plan.masked.empty()) return;
   baked = make_scene(device.get());
-  if (!plan.baked.empty()) attach_opaque(scene, state, plan.baked);
-  for (const std::uint32_t instance : plan.masked) attach_masked(scene, state, instance);
+  baked_instances.clear();
+  if (!plan.baked.empty()) attach_opaque(state);
+  for (const std::uint32_t instance : plan.masked) attach_masked(state, instance);
   rtcCommitScene(baked.get());
 }
 
 // All opaque baked instances as one geometry: Embree's cost per geometry would show with tens of thousands of
 // them.
-void Tracer::Impl::attach_opaque(const Scene& scene, const SceneState& state,
-                                 const std::vector<std::uint32_t>& ids) {
+void Tracer::Impl::attach_opaque(const SceneState& state) {
+  const std::vector<std::uint32_t>& ids = plan.baked;
   std::vector<std::size_t> first_vertex(ids.size() + 1, 0), first_triangle(ids.size() + 1, 0);
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const Mesh& mesh = scene.meshes[static_cast<std::size_t>(state.instances[ids[i]].mesh)];
@@ -254,7 +263,7 @@ void Tracer::Impl::attach_opaque(const Scene& scene, const SceneState& state,
   baked_instances.push_back(kNone);
 }
 
-void Tracer::Impl::attach_masked(const Scene& scene, const SceneState& state, std::uint32_t id) {
+void Tracer::Impl::attach_masked(const SceneState& state, std::uint32_t id) {
   const MeshInstance& instance = state.instances[id];
   const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh)];
   const GeometryPointer geometry = make_triangles(device.get());
@@ -276,7 +285,7 @@ void Tracer::Impl::let_filter_cut(RTCGeometry geometry, int mesh) {
 }
 
 // The structure that all instances of a mesh share, in the mesh's own space.
-RTCScene Tracer::Impl::shared_scene(const Scene& scene, int mesh_index) {
+RTCScene Tracer::Impl::shared_scene(int mesh_index) {
   ScenePointer& shared_mesh = shared[mesh_index];
   if (shared_mesh) return shared_mesh.get();
   const Mesh& mesh = scene.meshes[static_cast<std::size_t>(mesh_index)];
@@ -296,15 +305,13 @@ RTCScene Tracer::Impl::shared_scene(const Scene& scene, int mesh_index) {
   return shared_mesh.get();
 }
 
-void Tracer::Impl::build_instanced(const Scene& scene, const SceneState& state,
-                                   const std::vector<std::uint32_t>& ids) {
-  if (ids.empty()) return;
-  instanced_ids = ids;
+void Tracer::Impl::build_instanced(const SceneState& state) {
+  if (plan.instanced.empty()) return;
   instanced = make_scene(device.get());
-  for (const std::uint32_t id : ids) {
+  for (const std::uint32_t id : plan.instanced) {
     GeometryPointer geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_INSTANCE));
     rtcSetGeometryMask(geometry.get(), embree::kMaskAll);
-    rtcSetGeometryInstancedScene(geometry.get(), shared_scene(scene, state.instances[id].mesh));
+    rtcSetGeometryInstancedScene(geometry.get(), shared_scene(state.instances[id].mesh));
     rtcSetGeometryTimeStepCount(geometry.get(), 1);
     rtcAttachGeometry(instanced.get(), geometry.get());
     instance_geometries.push_back(std::move(geometry));
@@ -313,8 +320,8 @@ void Tracer::Impl::build_instanced(const Scene& scene, const SceneState& state,
 }
 
 void Tracer::Impl::place_instances(const SceneState& state) {
-  for (std::size_t i = 0; i < instanced_ids.size(); ++i) {
-    const mat4x3& to_world = state.instances[instanced_ids[i]].to_world;
+  for (std::size_t i = 0; i < plan.instanced.size(); ++i) {
+    const mat4x3& to_world = state.instances[plan.instanced[i]].to_world;
     RTCGeometry geometry = instance_geometries[i].get();
     if (is_invertible(to_world)) {
       rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, &to_world[0][0]);
@@ -328,52 +335,37 @@ void Tracer::Impl::place_instances(const SceneState& state) {
 }
 
 TriangleId Tracer::Impl::name_hit(unsigned geometry, unsigned primitive, unsigned embree_instance) const {
-  if (embree_instance != RTC_INVALID_GEOMETRY_ID) return {instanced_ids[embree_instance], primitive};
+  if (embree_instance != RTC_INVALID_GEOMETRY_ID) return {plan.instanced[embree_instance], primitive};
   if (geometry == 0 && !soup.empty()) return soup[primitive];
   return {baked_instances[geometry], primitive};
 }
 
 template <int kWidth>
 void Tracer::Impl::closest_packets(std::span<const Ray> rays, std::span<Hit> hits, bool coherent) const {
+  std::fill(hits.begin(), hits.end(), Hit{});
+  const TraceableRays traceable(rays);
   alignas(64) typename embree::Packet<kWidth>::RayHit packet;
   alignas(64) std::array<int, kWidth> valid;
-  prepare<decltype(packet.ray), kWidth>(packet.ray);
+  prepare<kWidth>(packet.ray);
   embree::Query query(coherent);
-  for (std::size_t first = 0; first < rays.size(); first += kWidth) {
-    const std::size_t count = std::min<std::size_t>(kWidth, rays.size() - first);
-    load(rays.subspan(first, count), packet.ray, valid);
+  for (std::size_t first = 0; first < traceable.count(); first += kWidth) {
+    load<kWidth>(rays, traceable, first, packet.ray, valid);
     for (std::size_t i = 0; i < kWidth; ++i) {
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
     if (baked) query.intersect(baked.get(), valid.data(), packet);
     if (instanced) query.intersect(instanced.get(), valid.data(), packet);
-    for (std::size_t i = 0; i < count; ++i) {
-      Hit& hit = hits[first + i];
-      if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
-        hit = Hit{};
-        continue;
-      }
+    for (std::size_t i = 0; i < kWidth && first + i < traceable.count(); ++i) {
+      if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
       const TriangleId id = name_hit(packet.hit.geomID[i], packet.hit.primID[i], packet.hit.instID[0][i]);
-      hit = {id.instance, id.triangle, packet.hit.u[i], packet.hit.v[i], packet.ray.tfar[i]};
+      Hit& hit = hits[traceable[first + i]];
+      hit.instance = id.instance;
+      hit.triangle = id.triangle;
+      hit.u = packet.hit.u[i];
+      hit.v = packet.hit.v[i];
+      hit.t = packet.ray.tfar[i];
     }
-  }
-}
-
-void Tracer::Impl::closest_singly(std::span<const Ray> rays, std::span<Hit> hits) const {
-  embree::Query query(false);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    hits[i] = Hit{};
-    if (!is_traceable(rays[i])) continue;
-    RTCRayHit ray;
-    ray.ray = make_ray(rays[i]);
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    if (baked) query.intersect(baked.get(), ray);
-    if (instanced) query.intersect(instanced.get(), ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
-    const TriangleId id = name_hit(ray.hit.geomID, ray.hit.primID, ray.hit.instID[0]);
-    hits[i] = {id.instance, id.triangle, ray.hit.u, ray.hit.v, ray.ray.tfar};
   }
 }
 
@@ -383,35 +375,22 @@ void Tracer::Impl::closest_singly(std::span<const Ray> rays, std::span<Hit> hits
 template <int kWidth>
 void Tracer::Impl::occluded_packets(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                                     bool coherent) const {
+  std::fill(occluded.begin(), occluded.end(), std::uint8_t{0});
+  const TraceableRays traceable(rays);
   alignas(64) typename embree::Packet<kWidth>::Ray packet;
   alignas(64) std::array<int, kWidth> valid;
-  prepare<decltype(packet), kWidth>(packet);
+  prepare<kWidth>(packet);
   embree::Query query(coherent), instance_query(false);
-  for (std::size_t first = 0; first < rays.size(); first += kWidth) {
-    const std::size_t count = std::min<std::size_t>(kWidth, rays.size() - first);
-    load(rays.subspan(first, count), packet, valid);
+  for (std::size_t first = 0; first < traceable.count(); first += kWidth) {
+    load<kWidth>(rays, traceable, first, packet, valid);
     if (baked) query.occluded(baked.get(), valid.data(), packet);
     if (baked && instanced) {
       for (std::size_t i = 0; i < kWidth; ++i) valid[i] &= packet.tfar[i] >= 0 ? -1 : 0;
     }
     if (instanced) instance_query.occluded(instanced.get(), valid.data(), packet);
-    // A lane that was never traced may hold any tmax, also -infinity.
-    for (std::size_t i = 0; i < count; ++i) {
-      occluded[first + i] =
-          static_cast<std::uint8_t>(packet.tfar[i] == -kInfinity && is_traceable(rays[first + i]));
+    for (std::size_t i = 0; i < kWidth && first + i < traceable.count(); ++i) {
+      occluded[traceable[first + i]] = static_cast<std::uint8_t>(packet.tfar[i] == -kInfinity);
     }
-  }
-}
-
-void Tracer::Impl::occluded_singly(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
-  embree::Query query(false);
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    occluded[i] = 0;
-    if (!is_traceable(rays[i])) continue;
-    RTCRay ray = make_ray(rays[i]);
-    if (baked) query.occluded(baked.get(), ray);
-    if (instanced && ray.tfar != -kInfinity) query.occluded(instanced.get(), ray);
-    occluded[i] = static_cast<std::uint8_t>(ray.tfar == -kInfinity);
   }
 }
 
@@ -420,15 +399,18 @@ Tracer::~Tracer() = default;
 Tracer::Tracer(Tracer&&) noexcept = default;
 Tracer& Tracer::operator=(Tracer&&) noexcept = default;
 
-void Tracer::update(const SceneState& state) {
-  bool same = state.instances.size() == impl_->mesh_of_instance.size();
+void Tracer::Impl::update(const SceneState& state) {
+  bool same = state.instances.size() == mesh_of_instance.size();
   for (std::size_t i = 0; same && i < state.instances.size(); ++i) {
-    same = state.instances[i].mesh == impl_->mesh_of_instance[i];
+    same = state.instances[i].mesh == mesh_of_instance[i];
   }
   if (!same) throw Error("A tracer can only be updated with another moment of the same scene.");
-  if (impl_->instanced) impl_->place_instances(state);
-  throw_on_error(impl_->device.get());
+  if (plan.baked_moves) build_baked(state);
+  if (instanced) place_instances(state);
+  throw_on_error(device.get());
 }
+
+void Tracer::update(const SceneState& state) { impl_->update(state); }
 
 namespace {
 
@@ -444,38 +426,26 @@ void for_blocks(std::size_t count, const Block& block) {
 
 void Tracer::closest(std::span<const Ray> rays, std::span<Hit> hits, Coherence coherence) const {
   if (rays.size() != hits.size()) throw Error("Tracer::closest needs as many hits as rays.");
-  if (impl_->recorder) {
-    impl_->recorder->closest.insert(impl_->recorder->closest.end(), rays.begin(), rays.end());
-  }
+  if (impl_->recorder) impl_->keep(rays, impl_->recorder->closest);
   for_blocks(rays.size(), [&](std::size_t first, std::size_t count) {
     const auto in = rays.subspan(first, count);
     const auto out = hits.subspan(first, count);
-    if (coherence == Coherence::kIncoherent) {
-      impl_->closest_singly(in, out);
-    } else if (impl_->wide) {
-      impl_->closest_packets<16>(in, out, true);
-    } else {
-      impl_->closest_packets<8>(in, out, true);
-    }
+    const bool coherent = coherence == Coherence::kCoherent;
+    impl_->wide ? impl_->closest_packets<16>(in, out, coherent)
+                : impl_->closest_packets<8>(in, out, coherent);
   });
 }
 
 void Tracer::occluded(std::span<const Ray> rays, std::span<std::uint8_t> occluded,
                       Coherence coherence) const {
   if (rays.size() != occluded.size()) throw Error("Tracer::occluded needs as many answers as rays.");
-  if (impl_->recorder) {
-    impl_->recorder->occluded.insert(impl_->recorder->occluded.end(), rays.begin(), rays.end());
-  }
+  if (impl_->recorder) impl_->keep(rays, impl_->recorder->occluded);
   for_blocks(rays.size(), [&](std::size_t first, std::size_t count) {
     const auto in = rays.subspan(first, count);
     const auto out = occluded.subspan(first, count);
-    if (coherence == Coherence::kIncoherent) {
-      impl_->occluded_singly(in, out);
-    } else if (impl_->wide) {
-      impl_->occluded_packets<16>(in, out, true);
-    } else {
-      impl_->occluded_packets<8>(in, out, true);
-    }
+    const bool coherent = coherence == Coherence::kCoherent;
+    impl_->wide ? impl_->occluded_packets<16>(in, out, coherent)
+                : impl_->occluded_packets<8>(in, out, coherent);
   });
 }
 

@@ -9,15 +9,19 @@
 
 namespace lumigrove {
 
-// Copies of meshes that are used several times are baked too, smallest first, while all copies together stay
-// below this many triangles: a ray that enters an instance costs a transform and its packet's coherence, a
-// baked triangle costs about 100 bytes.
+// A ray that enters an instance pays for a transform and for its packet's coherence (a third more time for
+// the shadow rays of a city), a baked triangle costs about 100 bytes. So copies of meshes that are used
+// several times are baked too, smallest first, while all copies together stay below this many triangles.
 inline constexpr std::size_t kMaxBakedCopies = std::size_t{1} << 20;
+
+// What moves is baked as well while the whole soup has no more triangles than this and is quick to rebuild.
+inline constexpr std::size_t kMaxRebuiltSoup = std::size_t{1} << 18;
 
 struct TracePlan {
   std::vector<std::uint32_t> baked;      // instances whose triangles join the opaque soup
   std::vector<std::uint32_t> masked;     // baked too, but each on its own: a filter function cuts its holes
-  std::vector<std::uint32_t> instanced;  // moving ones, and large meshes used several times
+  std::vector<std::uint32_t> instanced;  // what moves in large scenes, and large meshes used several times
+  bool baked_moves = false;              // something that was baked moves: another moment needs another soup
 };
 
 // Instances of empty meshes appear nowhere.

@@ -14,7 +14,8 @@ namespace lumigrove {
 
 enum class Coherence : std::uint8_t { kCoherent, kIncoherent };  // neighbours in the batch run alike?
 
-// A copy of everything that was asked of a tracer, in order: what the bench replays through bare Embree.
+// A copy of everything that was asked of a tracer, batch after batch: what the bench replays through bare
+// Embree.
 struct RayRecorder {
   std::vector<Ray> closest, occluded;
 };

@@ -1,0 +1,81 @@
+// The bench: named measurements whose values are ratios or sizes, because absolute times mean little on
+// shared machines. Both sides of a ratio are timed in one run, in turns, so that what disturbs one disturbs
+// the other.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace lumigrove::bench {
+
+struct Options {
+  int runs = 9;  // repetitions of each side
+};
+
+struct Result {
+  double value = 0;
+  std::vector<std::pair<std::string, double>> details;  // what the value was made from, units in the names
+};
+
+// Names are stable: they outlive the code behind them.
+struct Benchmark {
+  const char* name;
+  const char* unit;
+  const char* description;
+  std::optional<double> limit;  // the value should not exceed it
+  Result (*run)(const Options&);
+};
+
+const std::vector<Benchmark>& benchmarks();  // registry.cpp
+
+// One file each.
+Result sort_radix_1m(const Options& options);
+
+inline double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+template <class Function>
+double time_ms(const Function& function) {
+  const auto start = std::chrono::steady_clock::now();
+  function();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+struct PairTimes {
+  double a_ms = 0, b_ms = 0;  // medians
+  double ratio = 0;           // median over repetitions of a / b
+  double lowest_ratio = 0, highest_ratio = 0;
+};
+
+// Times `a` and `b` in turns after one untimed call of each. `prepare` runs untimed before every call.
+template <class A, class B, class Prepare>
+PairTimes time_in_turns(int runs, const A& a, const B& b, const Prepare& prepare) {
+  prepare();
+  a();
+  prepare();
+  b();
+  std::vector<double> a_ms, b_ms, ratios;
+  for (int i = 0; i < runs; ++i) {
+    prepare();
+    a_ms.push_back(time_ms(a));
+    prepare();
+    b_ms.push_back(time_ms(b));
+    ratios.push_back(a_ms.back() / b_ms.back());
+  }
+  const auto [lowest, highest] = std::minmax_element(ratios.begin(), ratios.end());
+  return {median(a_ms), median(b_ms), median(ratios), *lowest, *highest};
+}
+
+template <class A, class B>
+PairTimes time_in_turns(int runs, const A& a, const B& b) {
+  return time_in_turns(runs, a, b, [] {});
+}
+
+}  // namespace lumigrove::bench
