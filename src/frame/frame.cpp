@@ -1,0 +1,296 @@
+// A whole frame, top to bottom.
+
+#include "frame/frame.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "base/rng.h"
+#include "device/device.h"
+#include "frame/emission_kernel.h"
+#include "scene/surface_kernel.h"
+
+namespace lumigrove {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+// --- the camera
+// ------------------------------------------------------------------------------------------------
+
+CameraInstance look_at(const ViewSettings& view, Camera camera) {
+  CameraInstance result;
+  const vec3 forward = view.look_at - view.position;
+  const vec3 right = glm::cross(forward, view.up);
+  if (!(length_squared(forward) > 0) || !(length_squared(right) > 0))
+    throw Error("the view looks along its own up vector or at its own position; change --vp, --vi or --vu");
+  result.camera = std::move(camera);
+  result.position = view.position;
+  result.forward = glm::normalize(forward);
+  result.right = glm::normalize(right);
+  result.up = glm::cross(result.right, result.forward);
+  return result;
+}
+
+CameraInstance choose_camera(const SceneState& state, const Settings& settings) {
+  CameraInstance camera = state.cameras.empty() ? default_camera(state) : state.cameras.front();
+  if (!settings.camera.empty()) {
+    const auto named = std::find_if(state.cameras.begin(), state.cameras.end(), [&](const CameraInstance& c) {
+      return c.camera.name == settings.camera;
+    });
+    if (named == state.cameras.end()) {
+      std::string names;
+      for (const CameraInstance& c : state.cameras)
+        names += (names.empty() ? "" : ", ") + ("'" + c.camera.name + "'");
+      throw Error("the scene has no camera '" + settings.camera + "'; " +
+                  (names.empty() ? "it has none" : "it has " + names));
+    }
+    camera = *named;
+  }
+  if (settings.view) camera = look_at(*settings.view, camera.camera);
+  if (settings.fov) camera.camera.vertical_fov = *settings.fov * (kPi / 180);
+  return camera;
+}
+
+// --- one tile
+// ----------------------------------------------------------------------------------------------------
+
+// A tile's working set stays in a core's cache between the steps.
+constexpr int kTileSize = 64;
+
+struct TileBuffers {
+  std::vector<Ray> rays;
+  std::vector<Hit> hits;
+  std::vector<Surface> surfaces;
+  std::vector<std::uint32_t> pixels;
+  std::vector<vec3> direct, indirect, emission;
+  DirectBuffers direct_buffers;
+  double camera_ms = 0, primary_ms = 0, surface_ms = 0, film_ms = 0;
+  std::uint64_t primary_rays = 0;
+};
+
+PixelWindow crop_window(const Settings& settings) {
+  if (!settings.pixel_bounds) return {0, 0, settings.width, settings.height};
+  const auto& b = *settings.pixel_bounds;
+  return {std::clamp(b[0], 0, settings.width), std::clamp(b[2], 0, settings.height),
+          std::clamp(b[1], 0, settings.width), std::clamp(b[3], 0, settings.height)};
+}
+
+std::vector<PixelWindow> make_tiles(const PixelWindow& window) {
+  std::vector<PixelWindow> tiles;
+  for (int y = window.y0; y < window.y1; y += kTileSize)
+    for (int x = window.x0; x < window.x1; x += kTileSize)
+      tiles.push_back({x, y, std::min(x + kTileSize, window.x1), std::min(y + kTileSize, window.y1)});
+  return tiles;
+}
+
+// Runs `step` and adds its wall time to `ms`.
+template <class Step>
+void timed(double& ms, const Step& step) {
+  const auto start = Clock::now();
+  step();
+  ms += milliseconds_since(start);
+}
+
+// G-buffer · direct light · indirect light · film, for the pixels of one tile.
+void light_tile(const World& world, const Settings& settings, const DirectLighting& direct,
+                const CameraView& camera, const PixelWindow& tile, int sample, TileBuffers& b, Film& film) {
+  const int count = tile.count();
+  const std::size_t n = static_cast<std::size_t>(count);
+  const SceneView scene = world.arrays.view();
+  const LightView lights = world.lights.view();
+
+  timed(b.camera_ms, [&] {
+    b.rays.resize(n);
+    b.pixels.resize(n);
+    b.direct.assign(n, vec3(0));
+    b.indirect.assign(n, vec3(0));
+    b.emission.resize(n);
+    for (int i = 0; i < count; ++i)
+      b.pixels[static_cast<std::size_t>(i)] = rng_pixel(camera, pixel_of_index(tile, i));
+    launch(count, CameraKernel{camera, tile, b.rays, direct.rng.seed, direct.rng.frame, settings.jitter});
+  });
+  timed(b.primary_ms, [&] {
+    b.hits.resize(n);
+    world.tracer.closest(b.rays, b.hits, Coherence::kCoherent);
+    b.primary_rays += n;
+  });
+  timed(b.surface_ms, [&] {
+    b.surfaces.resize(n);
+    launch(count, SurfaceKernel{scene, b.rays, b.hits, b.surfaces, settings.force_diffuse});
+    launch(count, EmissionKernel{scene, lights, settings.light_scale, b.rays, b.surfaces, b.emission});
+  });
+
+  add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
+
+  timed(b.film_ms, [&] {
+    launch(count, FilmKernel{sample,
+                             lights,
+                             camera.position,
+                             camera.forward,
+                             b.surfaces,
+                             b.pixels,
+                             {b.direct, b.indirect, b.emission},
+                             film.pixels});
+  });
+}
+
+// Adds what each thread measured, as wall time: the threads' sum over their number.
+void add_pass(RenderStats& stats, const char* name, double thread_ms, std::uint64_t rays) {
+  const double ms = thread_ms / tbb::this_task_arena::max_concurrency();
+  for (PassStats& pass : stats.passes) {
+    if (pass.name != name) continue;
+    pass.ms += ms;
+    pass.rays += rays;
+    return;
+  }
+  stats.passes.push_back({name, ms, rays});
+}
+
+}  // namespace
+
+// --- the world
+// -----------------------------------------------------------------------------------------------------
+
+std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats) {
+  SceneState state = evaluate(scene, settings.time);
+  SceneArrays arrays(scene);
+  arrays.set_state(state);
+  const auto start = Clock::now();
+  Tracer tracer(scene, state);
+  stats.structures.push_back(
+      {"acceleration structure", milliseconds_since(start), tracer.bytes(), state.instances.size()});
+  LightSet lights(scene, arrays);
+  CameraInstance camera = choose_camera(state, settings);
+  auto world = std::make_unique<World>(World{
+      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, std::move(camera)});
+  build_lights(*world, settings, stats);
+  return world;
+}
+
+void build_lights(World& world, const Settings& settings, RenderStats& stats) {
+  world.lights.gather(world.arrays, world.state, settings);
+  const LightView lights = world.lights.view();
+  stats.emitters = lights.emitters.size();
+  stats.structures.push_back(
+      {"light set", world.lights.gather_ms(), world.lights.bytes(), lights.emitters.size()});
+  if (settings.direct.selection == Selection::kRoot) {
+    world.tree.build(lights, settings.direct.width, settings.direct.mis);
+    stats.structures.push_back(
+        {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
+  }
+  if (settings.direct.selection == Selection::kPower) {
+    const auto start = Clock::now();
+    std::vector<float> flux(lights.emitters.size());
+    launch(static_cast<int>(flux.size()), [&](int i) {
+      flux[static_cast<std::size_t>(i)] = emitter_flux(lights, static_cast<std::uint32_t>(i));
+    });
+    world.alias.build(flux);
+    stats.structures.push_back({"alias table", milliseconds_since(start), world.alias.bytes(), flux.size()});
+  }
+}
+
+DirectLighting make_direct_lighting(const World& world, const Settings& settings, int sample) {
+  DirectLighting direct;
+  direct.sampler.scene = world.arrays.view();
+  direct.sampler.lights = world.lights.view();
+  direct.sampler.alias = world.alias.view();
+  direct.sampler.tree = world.tree.view();
+  switch (settings.direct.selection) {
+    case Selection::kUniform:
+      direct.sampler.choice = LightChoice::kUniform;
+      break;
+    case Selection::kPower:
+      direct.sampler.choice = LightChoice::kPower;
+      break;
+    case Selection::kRoot:
+      direct.sampler.choice = LightChoice::kTree;
+      break;
+    case Selection::kAll:
+      direct.all = true;
+      break;
+  }
+  direct.tracer = &world.tracer;
+  // Frame and seed together key the hash's seed; camera samples count in its frame slot.
+  const uvec4 key = pcg4d(uvec4(settings.seed, static_cast<std::uint32_t>(settings.frame), 0, 0));
+  direct.rng.seed = key.x;
+  direct.rng.frame = static_cast<std::uint32_t>(sample);
+  direct.spp = settings.direct.spp;
+  direct.mis = settings.direct.mis;
+  return direct;
+}
+
+// --- one camera sample of the whole image
+// ------------------------------------------------------------------------
+
+void render_sample(const World& world, const Settings& settings, int sample, Film& film, RenderStats& stats) {
+  const CameraView camera = make_camera_view(world.camera, settings.width, settings.height);
+  const DirectLighting direct = make_direct_lighting(world, settings, sample);
+  const std::vector<PixelWindow> tiles = make_tiles(crop_window(settings));
+  tbb::enumerable_thread_specific<TileBuffers> buffers;
+
+  launch(
+      static_cast<int>(tiles.size()),
+      [&](int i) {
+        // Isolated: while a tile waits for its own inner loops it must not start another tile in the same
+        // buffers.
+        tbb::this_task_arena::isolate([&] {
+          light_tile(world, settings, direct, camera, tiles[static_cast<std::size_t>(i)], sample,
+                     buffers.local(), film);
+        });
+      },
+      1);
+
+  TileBuffers sum;
+  for (const TileBuffers& b : buffers) {
+    sum.camera_ms += b.camera_ms;
+    sum.primary_ms += b.primary_ms;
+    sum.surface_ms += b.surface_ms;
+    sum.film_ms += b.film_ms;
+    sum.primary_rays += b.primary_rays;
+    sum.direct_buffers.select_ms += b.direct_buffers.select_ms;
+    sum.direct_buffers.trace_ms += b.direct_buffers.trace_ms;
+    sum.direct_buffers.rays += b.direct_buffers.rays;
+  }
+  add_pass(stats, "camera rays", sum.camera_ms, 0);
+  add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
+  add_pass(stats, "surfaces", sum.surface_ms, 0);
+  add_pass(stats, "light selection", sum.direct_buffers.select_ms, 0);
+  add_pass(stats, "shadow rays", sum.direct_buffers.trace_ms, sum.direct_buffers.rays);
+  add_pass(stats, "film", sum.film_ms, 0);
+}
+
+Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
+             const ProgressFunction& progress) {
+  check(settings);
+  RenderStats local;
+  RenderStats& result = stats ? *stats : local;
+  result = {};
+  const int threads = settings.threads > 0 ? settings.threads : tbb::this_task_arena::max_concurrency();
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(threads));
+  tbb::task_arena arena(threads);
+  return arena.execute([&] {
+    const auto start = Clock::now();
+    const std::unique_ptr<World> world = make_world(scene, settings, result);
+    Film film(settings.width, settings.height);
+    for (int sample = 0; sample < settings.spp; ++sample) {
+      render_sample(*world, settings, sample, film, result);
+      result.spp_done = sample + 1;
+      if (progress && !progress({result.spp_done, settings.spp, milliseconds_since(start) * 1e-3})) break;
+    }
+    result.total_ms = milliseconds_since(start);
+    return develop(film, result.spp_done);
+  });
+}
+
+}  // namespace lumigrove

@@ -1,0 +1,46 @@
+// A frame's world and its steps. `render` (lumigrove/renderer.h) is these steps in order; the bench times
+// them.
+#pragma once
+
+#include <memory>
+
+#include "frame/film.h"
+#include "lights/light_set.h"
+#include "lumigrove/renderer.h"
+#include "methods/light_sampling/alias_table.h"
+#include "methods/light_sampling/direct_lighting.h"
+#include "methods/light_tree/light_tree.h"
+#include "scene/camera_kernel.h"
+#include "scene/scene_view.h"
+#include "trace/trace.h"
+
+namespace lumigrove {
+
+// Everything that one moment of a scene needs before the first ray: made anew for every frame of an
+// animation.
+struct World {
+  SceneState state;
+  SceneArrays arrays;
+  Tracer tracer;
+  LightSet lights;
+  LightTree tree;    // built when direct.hierarchy is perfect and direct.selection is root
+  AliasTable alias;  // built when direct.selection is power
+  CameraInstance camera;
+};
+
+// The scene at settings.time: transforms, acceleration structure, emitters, hierarchy, camera. `scene` must
+// outlive it. Adds a line per structure to `stats`. Throws Error for an unknown camera or a scene without a
+// place to stand.
+std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats);
+
+// Emitters and their hierarchy alone, as every frame rebuilds them.
+void build_lights(World& world, const Settings& settings, RenderStats& stats);
+
+// The light sampler that settings.direct asks for, over the world's lights.
+DirectLighting make_direct_lighting(const World& world, const Settings& settings, int sample);
+
+// Adds camera sample number `sample` (from 0) to every pixel of the crop window. Pass times and rays go to
+// `stats`.
+void render_sample(const World& world, const Settings& settings, int sample, Film& film, RenderStats& stats);
+
+}  // namespace lumigrove

@@ -1,0 +1,160 @@
+// One emitter of the light set: flux, bounds, a point on it, and the light that arrives from that point.
+//
+// Point and spot lights follow KHR_lights_punctual: smooth cone edge squared, window 1 - (d/range)^4 over the
+// inverse square. Triangles are sampled uniformly by area.
+#pragma once
+
+#include "base/vec.h"
+#include "lights/light_set.h"
+#include "scene/texture.h"
+
+namespace lumigrove {
+
+LUMI_HD inline float triangle_area(const Emitter& e) { return 0.5f * glm::length(glm::cross(e.e1, e.e2)); }
+
+LUMI_HD inline vec3 mean_radiance(const LightView& lights, const Emitter& e, std::uint32_t index) {
+  const EmissiveInstance& instance = lights.instances[e.source];
+  return instance.mean_texture ? instance.radiance * instance.mean_texture[index - instance.first]
+                               : instance.radiance;
+}
+
+// Non-finite or negative values (a degenerate triangle, an absurd transform) count as no light.
+LUMI_HD inline float finite_or_zero(float x) { return x > 0 && x < 3e38f ? x : 0.0f; }
+
+// Largest radiant intensity in any direction, Y, W/sr: L*A of a triangle, I of a point or spot light. This is
+// ||I|| of the light trees, which bound direction and distance separately.
+LUMI_HD inline float emitter_intensity(const LightView& lights, std::uint32_t index) {
+  const Emitter& e = lights.emitters[index];
+  if (e.punctual())
+    return finite_or_zero(luminance(lights.punctual[e.source & ~Emitter::kPunctual].intensity));
+  return finite_or_zero(luminance(mean_radiance(lights, e, index)) * triangle_area(e));
+}
+
+// Total power, Y, W.
+LUMI_HD inline float emitter_flux(const LightView& lights, std::uint32_t index) {
+  const Emitter& e = lights.emitters[index];
+  const float intensity = emitter_intensity(lights, index);
+  if (!e.punctual()) return intensity * kPi * (lights.instances[e.source].double_sided ? 2.0f : 1.0f);
+  if (!lights.punctual[e.source & ~Emitter::kPunctual].spot) return intensity * 4 * kPi;
+  // Integral of the squared linear ramp in cos over the cone.
+  const float cos_outer = e.e2.x, cos_inner = cos_outer + 1 / e.e2.y;
+  return intensity * 2 * kPi * glm::max(0.0f, (1 - cos_inner) + (cos_inner - cos_outer) / 3);
+}
+
+LUMI_HD inline Box3 emitter_bounds(const Emitter& e) {
+  if (e.punctual()) return {e.p0, e.p0};
+  const vec3 p1 = e.p0 + e.e1, p2 = e.p0 + e.e2;
+  return {glm::min(e.p0, glm::min(p1, p2)), glm::max(e.p0, glm::max(p1, p2))};
+}
+
+// Index of the emitter that a hit triangle is, EmissiveInstance::kNoEmitters if none.
+LUMI_HD inline std::uint32_t emitter_of_triangle(const LightView& lights, std::uint32_t instance,
+                                                 std::uint32_t triangle) {
+  const EmissiveInstance& e = lights.instances[instance];
+  if (e.first == EmissiveInstance::kNoEmitters) return EmissiveInstance::kNoEmitters;
+  const std::uint32_t rank = e.ranks ? e.ranks[triangle] : triangle;
+  return rank == EmissiveInstance::kNoEmitters ? rank : e.first + rank;
+}
+
+// Identity of an emitter that lasts while the scene's structure lasts, also when other lights come and go.
+LUMI_HD inline std::uint32_t stable_id(const LightView& lights, std::uint32_t index) {
+  const Emitter& e = lights.emitters[index];
+  if (e.punctual()) return lights.punctual[e.source & ~Emitter::kPunctual].stable_id;
+  const EmissiveInstance& instance = lights.instances[e.source];
+  const std::uint32_t rank = index - instance.first;
+  return instance.stable_base + (instance.triangles ? instance.triangles[rank] : rank);
+}
+
+// A point on an emitter and what arrives from it at a place `x`, nothing in between.
+struct EmitterPoint {
+  vec3 position = vec3(0);
+  vec3 wi = vec3(0);  // unit, from x to position
+  float distance = 0;
+  vec3 incident = vec3(0);  // triangles: radiance; point and spot: irradiance at normal incidence
+  float area_to_solid =
+      0;  // d^2 / cos at the light: converts a pdf per area to one per solid angle; 0 for a delta
+};
+
+LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitter& e, vec3 x) {
+  EmitterPoint p;
+  const PunctualView& light = lights.punctual[e.source & ~Emitter::kPunctual];
+  const vec3 to_light = e.p0 - x;
+  const float d2 = length_squared(to_light);
+  if (!(d2 > 0)) return p;
+  p.position = e.p0;
+  p.distance = glm::sqrt(d2);
+  p.wi = to_light / p.distance;
+  float attenuation = 1 / d2;
+  if (light.range > 0) {
+    const float ratio2 = d2 / (light.range * light.range);
+    attenuation *= glm::clamp(1 - ratio2 * ratio2, 0.0f, 1.0f);
+  }
+  if (light.spot) {
+    const float ramp = glm::clamp((-glm::dot(p.wi, e.e1) - e.e2.x) * e.e2.y, 0.0f, 1.0f);
+    attenuation *= ramp * ramp;
+  }
+  p.incident = light.intensity * attenuation;
+  return p;
+}
+
+LUMI_HD inline vec3 emissive_texture_at(const SceneView& scene, const EmissiveInstance& emissive,
+                                        const Emitter& e, std::uint32_t index, float b1, float b2) {
+  const InstanceView& instance = scene.instances[e.source];
+  const MeshView& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh)];
+  const MaterialView& material = scene.materials[static_cast<std::size_t>(mesh.material)];
+  const std::uint32_t rank = index - emissive.first;
+  const uvec3 v = mesh.triangles[emissive.triangles ? emissive.triangles[rank] : rank];
+  if (instance.flip < 0) {  // e1 and e2 changed places in a mirrored instance
+    const float swap = b1;
+    b1 = b2;
+    b2 = swap;
+  }
+  const auto at = [&](const vec2* uv) {
+    return uv ? uv[v.x] * (1 - b1 - b2) + uv[v.y] * b1 + uv[v.z] * b2 : vec2(0);
+  };
+  return vec3(sample_texture(scene, material.emissive_texture, at(mesh.uv0), at(mesh.uv1)));
+}
+
+LUMI_HD inline EmitterPoint triangle_point(const SceneView& scene, const LightView& lights, const Emitter& e,
+                                           std::uint32_t index, vec3 x, vec2 u) {
+  EmitterPoint p;
+  const float root = glm::sqrt(u.x);  // uniform by area
+  const float b1 = 1 - root, b2 = u.y * root;
+  p.position = e.p0 + e.e1 * b1 + e.e2 * b2;
+  const vec3 to_light = p.position - x;
+  const float d2 = length_squared(to_light);
+  if (!(d2 > 0)) return p;
+  const vec3 n = glm::cross(e.e1, e.e2);
+  const EmissiveInstance& instance = lights.instances[e.source];
+  const float inverse = 1 / glm::sqrt(d2);
+  float cos_light = -glm::dot(to_light, n) * inverse / glm::length(n);
+  if (instance.double_sided) cos_light = glm::abs(cos_light);
+  if (!(cos_light > 0)) return p;
+  p.distance = d2 * inverse;
+  p.wi = to_light * inverse;
+  p.incident = instance.radiance;
+  if (instance.textured) p.incident *= emissive_texture_at(scene, instance, e, index, b1, b2);
+  p.area_to_solid = d2 / cos_light;
+  return p;
+}
+
+// `incident` is zero when nothing can arrive (back side, outside the cone or range, x on the light).
+LUMI_HD inline EmitterPoint sample_emitter_point(const SceneView& scene, const LightView& lights,
+                                                 std::uint32_t index, vec3 x, vec2 u) {
+  const Emitter& e = lights.emitters[index];
+  return e.punctual() ? punctual_point(lights, e, x) : triangle_point(scene, lights, e, index, x, u);
+}
+
+// Density per solid angle at `x` with which sample_emitter_point finds the point `y` of triangle `index`.
+LUMI_HD inline float pdf_emitter_point(const LightView& lights, std::uint32_t index, vec3 x, vec3 y) {
+  const Emitter& e = lights.emitters[index];
+  if (e.punctual()) return 0;
+  const vec3 to_light = y - x;
+  const float d2 = length_squared(to_light);
+  const vec3 n = glm::cross(e.e1, e.e2);  // |n| = 2A
+  float cos_times_2area_d = -glm::dot(to_light, n);
+  if (lights.instances[e.source].double_sided) cos_times_2area_d = glm::abs(cos_times_2area_d);
+  return cos_times_2area_d > 0 ? 2 * d2 * glm::sqrt(d2) / cos_times_2area_d : 0.0f;
+}
+
+}  // namespace lumigrove

@@ -1,0 +1,60 @@
+#include "methods/light_sampling/direct_lighting.h"
+
+#include <chrono>
+
+#include "device/device.h"
+#include "methods/light_sampling/direct_lighting_kernel.h"
+
+namespace lumigrove {
+namespace {
+
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
+                    std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
+                    std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
+  const int count = static_cast<int>(surfaces.size());
+  auto start = std::chrono::steady_clock::now();
+  launch(count, DirectLightKernel{sampler, lighting.rng, dimension, 1.0f / static_cast<float>(lighting.spp),
+                                  lighting.mis, surfaces, pixels, buffers.shadow, buffers.contribution});
+  buffers.select_ms += milliseconds_since(start);
+
+  start = std::chrono::steady_clock::now();
+  lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
+  buffers.trace_ms += milliseconds_since(start);
+
+  for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
+  launch(count, AddUnoccludedKernel{buffers.contribution, buffers.occluded, sum});
+}
+
+}  // namespace
+
+void add_direct_light(const DirectLighting& lighting, std::span<const Surface> surfaces,
+                      std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
+                      std::span<vec3> sum) {
+  buffers.shadow.resize(surfaces.size());
+  buffers.contribution.resize(surfaces.size());
+  buffers.occluded.resize(surfaces.size());
+  // Every light's sample takes a block of four dimensions; samples beyond the vertex's share continue under
+  // another seed rather than into the next vertex's numbers.
+  constexpr std::uint32_t kBlocks = (kDimBsdf - kDimLight) / 4;
+  DirectLighting current = lighting;
+  const std::uint32_t lights = lighting.all ? light_count(lighting.sampler.lights) : 1;
+  for (std::uint32_t light = 0; light < lights; ++light) {
+    LightSampler sampler = lighting.sampler;
+    if (lighting.all) {
+      sampler.choice = LightChoice::kOne;
+      sampler.one = light;
+    }
+    for (int s = 0; s < lighting.spp; ++s) {
+      const std::uint32_t block =
+          light * static_cast<std::uint32_t>(lighting.spp) + static_cast<std::uint32_t>(s);
+      current.rng.seed = lighting.rng.seed + 0x9e3779b9u * (block / kBlocks);
+      add_one_sample(current, sampler, surfaces, pixels, dimension + 4 * (block % kBlocks), buffers, sum);
+    }
+  }
+}
+
+}  // namespace lumigrove

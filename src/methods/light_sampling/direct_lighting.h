@@ -1,0 +1,41 @@
+// Direct light at a batch of surfaces: choose lights, trace one batch of shadow rays, add what gets through.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/rng.h"
+#include "methods/light_sampling/light_sampler_kernel.h"
+#include "scene/surface.h"
+#include "trace/trace.h"
+
+namespace lumigrove {
+
+// How lights are chosen at every surface of a frame. Plain data: copy freely.
+struct DirectLighting {
+  LightSampler sampler;
+  const Tracer* tracer = nullptr;
+  Rng rng;           // seed and frame; the pixel is set for each surface
+  int spp = 1;       // light samples a surface, averaged
+  bool all = false;  // instead: spp samples of every light, summed (the oracle)
+  bool mis = false;  // weigh samples for use beside BSDF sampling (balance heuristic)
+};
+
+// Working memory, reused from batch to batch. `rays` counts the shadow rays traced.
+struct DirectBuffers {
+  std::vector<Ray> shadow;
+  std::vector<vec3> contribution;
+  std::vector<std::uint8_t> occluded;
+  std::uint64_t rays = 0;
+  double select_ms = 0, trace_ms = 0;
+};
+
+// sum[i] += light reaching surfaces[i] from the chosen lights and leaving it towards wo (radiance).
+// `pixels[i]` keys the random numbers, `dimension` is the first one used (kDimLight of the path vertex). All
+// spans have equal length; surfaces with instance == kNone get nothing.
+void add_direct_light(const DirectLighting& lighting, std::span<const Surface> surfaces,
+                      std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
+                      std::span<vec3> sum);
+
+}  // namespace lumigrove

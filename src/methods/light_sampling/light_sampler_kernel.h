@@ -1,0 +1,259 @@
+// Method      Chooses one light for a surface point, a point on it, and says with what probability:
+// uniformly, by
+//             power, or by a walk down the light tree; directional lights and the environment beside the
+//             local ones.
+// Paper       none of its own; P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting
+//             Calculations", ACM TOG 15(1), 1996 for the choice by power.
+// Symbols     p(group) -> group_probabilities -> local emitters, directional lights or environment, given the
+// surface
+//             p(light | group) -> AliasView::pdf, 1/n or pdf_light_tree
+//             p(y | light) -> EmitterPoint::area_to_solid / A -> per solid angle at the surface
+// Equations   contribution = f * cos * incident / (p(group) p(light | group) p(y | light))
+// Departures  none
+// Estimator   unbiased: a group or light that can contribute has positive probability.
+// In -> Out   Surface, four uniform numbers -> LightSample; weight 0 where the draw carries no light.
+// Oracle      LightSampler::Kind::kOne over every light in turn (selection "all"): the exhaustive sum.
+#pragma once
+
+#include "base/rng.h"
+#include "lights/emitter.h"
+#include "lights/environment.h"
+#include "methods/light_sampling/alias_table.h"
+#include "methods/light_tree/light_tree_kernel.h"
+#include "scene/surface.h"
+#include "trace/ray.h"
+
+namespace lumigrove {
+
+// One light's answer to a surface. The contribution is bsdf * cos * weight, if `shadow` is free.
+struct LightSample {
+  vec3 wi = vec3(0);                   // unit, towards the light
+  float pdf = 0;                       // per solid angle, selection included; 0 for lights without area
+  vec3 weight = vec3(0);               // radiance / pdf, or irradiance / selection probability without area
+  std::uint32_t emitter = kNoEmitter;  // local emitter, kNoEmitter for lights at infinity
+  float distance = 0;                  // metres; infinite for lights at infinity
+};
+
+enum class LightChoice : std::uint8_t { kUniform, kPower, kTree, kOne };
+
+struct LightSampler {
+  SceneView scene;
+  LightView lights;
+  LightChoice choice = LightChoice::kUniform;
+  AliasView alias;        // kPower: over emitter_flux
+  LightTreeView tree;     // kTree
+  std::uint32_t one = 0;  // kOne: emitters, then directional lights, then the environment
+};
+
+struct GroupProbabilities {
+  float local = 0, directional = 0, environment = 0;
+};
+
+// Half by the flux of the groups that can reach this side of the surface, half evenly among them, so that a
+// mistaken estimate costs at most a factor.
+LUMI_HD inline GroupProbabilities group_probabilities(const LightSampler& sampler, const Surface& surface) {
+  const LightView& lights = sampler.lights;
+  const bool local = lights.local_flux > 0;
+  if (lights.directional.empty() && !lights.environment.present()) return {local ? 1.0f : 0.0f, 0, 0};
+  float directional_flux = 0;
+  for (const DirectionalView& light : lights.directional)
+    if (glm::dot(light.direction, surface.normal) < 0)
+      directional_flux += luminance(light.irradiance) * lights.scene_disc;
+  const float environment_flux = lights.environment.present() ? lights.environment_flux : 0.0f;
+  const float local_flux = local ? lights.local_flux : 0.0f;
+  const float total = local_flux + directional_flux + environment_flux;
+  if (!(total > 0)) return {};
+  const float groups = (local_flux > 0 ? 1.0f : 0.0f) + (directional_flux > 0 ? 1.0f : 0.0f) +
+                       (environment_flux > 0 ? 1.0f : 0.0f);
+  const auto share = [&](float flux) { return flux > 0 ? 0.5f * flux / total + 0.5f / groups : 0.0f; };
+  return {share(local_flux), share(directional_flux), share(environment_flux)};
+}
+
+LUMI_HD inline TreeSample sample_tree(const LightTreeView& tree, vec3 x, vec3 n, vec2 u) {
+  if (tree.count == 0) return {};
+  switch (tree.width) {
+    case 2:
+      return sample_light_tree<2>(tree, x, n, u);
+    case 4:
+      return sample_light_tree<4>(tree, x, n, u);
+    case 8:
+      return sample_light_tree<8>(tree, x, n, u);
+    default:
+      return sample_light_tree<16>(tree, x, n, u);
+  }
+}
+
+LUMI_HD inline float pdf_tree(const LightTreeView& tree, vec3 x, vec3 n, std::uint32_t emitter) {
+  if (tree.count == 0) return 0;
+  switch (tree.width) {
+    case 2:
+      return pdf_light_tree<2>(tree, x, n, emitter);
+    case 4:
+      return pdf_light_tree<4>(tree, x, n, emitter);
+    case 8:
+      return pdf_light_tree<8>(tree, x, n, emitter);
+    default:
+      return pdf_light_tree<16>(tree, x, n, emitter);
+  }
+}
+
+// One local emitter; pdf 0 when there is none to choose. u.x, u.y are used up.
+LUMI_HD inline TreeSample choose_emitter(const LightSampler& sampler, const Surface& surface, vec2 u) {
+  const std::uint32_t n = static_cast<std::uint32_t>(sampler.lights.emitters.size());
+  switch (sampler.choice) {
+    case LightChoice::kUniform: {
+      const std::uint32_t i = static_cast<std::uint32_t>(static_cast<double>(u.x) * n);
+      return {i < n ? i : n - 1, 1.0f / static_cast<float>(n)};
+    }
+    case LightChoice::kPower: {
+      const std::uint32_t i = sample_alias(sampler.alias, u.x, u.y);
+      return {i, sampler.alias.pdf(emitter_flux(sampler.lights, i))};
+    }
+    case LightChoice::kTree:
+      return sample_tree(sampler.tree, surface.position, surface.normal, u);
+    case LightChoice::kOne:
+      break;
+  }
+  return {sampler.one, 1};
+}
+
+// Probability with which choose_emitter returns `emitter` here.
+LUMI_HD inline float pdf_choose_emitter(const LightSampler& sampler, const Surface& surface,
+                                        std::uint32_t emitter) {
+  switch (sampler.choice) {
+    case LightChoice::kUniform:
+      return 1.0f / static_cast<float>(sampler.lights.emitters.size());
+    case LightChoice::kPower:
+      return sampler.alias.pdf(emitter_flux(sampler.lights, emitter));
+    case LightChoice::kTree:
+      return pdf_tree(sampler.tree, surface.position, surface.normal, emitter);
+    case LightChoice::kOne:
+      break;
+  }
+  return sampler.one == emitter ? 1.0f : 0.0f;
+}
+
+LUMI_HD inline LightSample local_sample(const LightSampler& sampler, const Surface& surface,
+                                        TreeSample chosen, vec2 u) {
+  LightSample sample;
+  if (!(chosen.pdf > 0)) return sample;
+  const EmitterPoint point =
+      sample_emitter_point(sampler.scene, sampler.lights, chosen.emitter, surface.position, u);
+  if (!(max_component(point.incident) > 0)) return sample;
+  sample.wi = point.wi;
+  sample.distance = point.distance;
+  sample.emitter = chosen.emitter;
+  const Emitter& emitter = sampler.lights.emitters[chosen.emitter];
+  if (emitter.punctual()) {
+    sample.weight = point.incident / chosen.pdf;
+  } else {
+    sample.pdf = chosen.pdf * point.area_to_solid / triangle_area(emitter);
+    sample.weight = point.incident / sample.pdf;
+  }
+  return sample;
+}
+
+LUMI_HD inline LightSample directional_sample(const DirectionalView& light, float probability) {
+  LightSample sample;
+  sample.wi = -light.direction;
+  sample.distance = kInfinity;
+  sample.weight = light.irradiance / probability;
+  return sample;
+}
+
+LUMI_HD inline LightSample environment_sample(const LightSampler& sampler, const Surface& surface,
+                                              float probability, vec2 u) {
+  LightSample sample;
+  const EnvironmentSample drawn = sample_environment(sampler.lights.environment, surface.normal, u);
+  if (!(drawn.pdf > 0)) return sample;
+  sample.wi = drawn.wi;
+  sample.distance = kInfinity;
+  sample.pdf = drawn.pdf * probability;
+  sample.weight = environment_radiance(sampler.scene, sampler.lights.environment, drawn.wi) / sample.pdf;
+  return sample;
+}
+
+// Light number `one` of the exhaustive sum: every light once, a random point on it.
+LUMI_HD inline LightSample one_sample(const LightSampler& sampler, const Surface& surface, vec2 u) {
+  const std::uint32_t local = static_cast<std::uint32_t>(sampler.lights.emitters.size());
+  if (sampler.one < local) return local_sample(sampler, surface, {sampler.one, 1}, u);
+  const std::uint32_t at_infinity = sampler.one - local;
+  if (at_infinity < sampler.lights.directional.size())
+    return directional_sample(sampler.lights.directional[at_infinity], 1);
+  return environment_sample(sampler, surface, 1, u);
+}
+
+// Number of lights that kOne counts through.
+LUMI_HD inline std::uint32_t light_count(const LightView& lights) {
+  return static_cast<std::uint32_t>(lights.emitters.size() + lights.directional.size()) +
+         (lights.environment.present() ? 1u : 0u);
+}
+
+// Draws a light and a point on it. u.x: group and light, u.y and u.z: point, u.w: light (second number).
+LUMI_HD inline LightSample sample_light(const LightSampler& sampler, const Surface& surface, vec4 u) {
+  const vec2 u_point(u.y, u.z);
+  if (sampler.choice == LightChoice::kOne) return one_sample(sampler, surface, u_point);
+  const GroupProbabilities group = group_probabilities(sampler, surface);
+  float r = u.x;
+  if (r < group.local) {
+    r = glm::min(r / group.local, 0x1.fffffep-1f);
+    TreeSample chosen = choose_emitter(sampler, surface, vec2(r, u.w));
+    chosen.pdf *= group.local;
+    return local_sample(sampler, surface, chosen, u_point);
+  }
+  r -= group.local;
+  if (r < group.directional) {
+    // Among those in front of the surface, by irradiance times cosine.
+    float total = 0;
+    for (const DirectionalView& light : sampler.lights.directional)
+      total += luminance(light.irradiance) * glm::max(0.0f, -glm::dot(light.direction, surface.normal));
+    float rest = r / group.directional * total;
+    LightSample sample;
+    for (const DirectionalView& light : sampler.lights.directional) {
+      const float weight =
+          luminance(light.irradiance) * glm::max(0.0f, -glm::dot(light.direction, surface.normal));
+      if (!(weight > 0)) continue;
+      sample = directional_sample(light, group.directional * weight / total);
+      if (rest < weight) break;
+      rest -= weight;
+    }
+    return sample;
+  }
+  if (group.environment > 0) return environment_sample(sampler, surface, group.environment, u_point);
+  return {};
+}
+
+// Density per solid angle with which sample_light finds point `y` of `emitter` from `surface`.
+LUMI_HD inline float pdf_light(const LightSampler& sampler, const Surface& surface, std::uint32_t emitter,
+                               vec3 y) {
+  const float p = group_probabilities(sampler, surface).local;
+  if (!(p > 0)) return 0;
+  return p * pdf_choose_emitter(sampler, surface, emitter) *
+         pdf_emitter_point(sampler.lights, emitter, surface.position, y);
+}
+
+// The same for the environment in direction `wi`.
+LUMI_HD inline float pdf_light_environment(const LightSampler& sampler, const Surface& surface, vec3 wi) {
+  const float p = group_probabilities(sampler, surface).environment;
+  return p > 0 ? p * pdf_environment(sampler.lights.environment, surface.normal, wi) : 0.0f;
+}
+
+// Segment from the surface to the light sample; it stops short of the light by the same relative margin
+// everywhere.
+LUMI_HD inline Ray shadow_ray(const Surface& surface, const LightSample& sample, float diagonal) {
+  Ray ray;
+  const float side = glm::dot(sample.wi, surface.geometric_normal) >= 0 ? 1.0f : -1.0f;
+  ray.origin = surface.position + surface.geometric_normal * (side * surface.epsilon);
+  ray.tmin = 0;
+  if (sample.distance == kInfinity) {
+    ray.direction = sample.wi * (2 * diagonal);
+    ray.tmax = 1;
+    return ray;
+  }
+  // Aim at the light from the moved origin, or a point at grazing angles would see past its own occluder.
+  ray.direction = surface.position + sample.wi * sample.distance - ray.origin;
+  ray.tmax = 1 - glm::min(0.5f, 1e-4f + surface.epsilon / sample.distance);
+  return ray;
+}
+
+}  // namespace lumigrove

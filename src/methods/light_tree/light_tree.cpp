@@ -1,0 +1,95 @@
+#include "methods/light_tree/light_tree.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "device/device.h"
+#include "device/reduce.h"
+#include "lumigrove/error.h"
+
+namespace lumigrove {
+
+void LightTree::build(const LightView& lights, int width, bool keep_leaves) {
+  const auto start = std::chrono::steady_clock::now();
+  const int emitters = static_cast<int>(lights.emitters.size());
+  view_ = {};
+  view_.width = width;
+  // Not below the smallest distance whose square a float resolves against the scene.
+  view_.inside2 = 1e-14f * lights.diagonal * lights.diagonal;
+
+  const Box3 bounds = reduce(
+      emitters, Box3{}, [&](int i) { return emitter_bounds(lights.emitters[static_cast<std::size_t>(i)]); },
+      [](Box3 a, Box3 b) { return unite(a, b); });
+  keys_.resize(static_cast<std::size_t>(emitters));
+  launch(emitters, MortonKernel{lights, bounds.lo, inverse_extent(bounds), keys_}, 4096);
+  radix_sort(keys_, 31, scratch_);
+  const auto dropped =
+      std::partition_point(keys_.begin(), keys_.end(), [](KeyIndex k) { return k.key < kDroppedKey; });
+  view_.count = static_cast<std::uint32_t>(dropped - keys_.begin());
+
+  leaf_emitters_.resize(view_.count);
+  emitter_leaves_.clear();
+  if (keep_leaves) emitter_leaves_.assign(static_cast<std::size_t>(emitters), kNoEmitter);
+  switch (width) {
+    case 2:
+      build_levels<2>(lights);
+      break;
+    case 4:
+      build_levels<4>(lights);
+      break;
+    case 8:
+      build_levels<8>(lights);
+      break;
+    case 16:
+      build_levels<16>(lights);
+      break;
+    default:
+      throw Error("a light tree has 2, 4, 8 or 16 children a node, not " + std::to_string(width));
+  }
+  build_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+template <int W>
+void LightTree::build_levels(const LightView& lights) {
+  std::vector<std::uint32_t> counts;  // nodes a level, lowest first
+  for (std::uint32_t n = view_.count; n > 0 && (counts.empty() || n > 1);)
+    counts.push_back(n = (n + W - 1) / W);
+  view_.levels = static_cast<int>(counts.size());
+  std::uint32_t total = 0;
+  for (int level = 0; level < view_.levels; ++level) {
+    view_.level_first[level] = total;
+    total += counts[static_cast<std::size_t>(view_.levels - 1 - level)];
+  }
+  constexpr std::size_t kNodeFloats = static_cast<std::size_t>(kNodeRows) * W;
+  nodes_.resize(total * kNodeFloats);
+  const auto level_nodes = [&](int level) { return nodes_.data() + view_.level_first[level] * kNodeFloats; };
+
+  for (int level = view_.levels - 1; level >= 0; --level) {
+    const std::uint32_t count = counts[static_cast<std::size_t>(view_.levels - 1 - level)];
+    if (level == view_.levels - 1) {
+      launch(static_cast<int>(count),
+             LeafNodeKernel<W>{lights, keys_, view_.count, level_nodes(level), leaf_emitters_.data(),
+                               emitter_leaves_.empty() ? nullptr : emitter_leaves_.data()},
+             1024 / W);
+    } else {
+      const std::uint32_t below = counts[static_cast<std::size_t>(view_.levels - 2 - level)];
+      launch(static_cast<int>(count), InnerNodeKernel<W>{level_nodes(level + 1), below, level_nodes(level)},
+             4096 / W);
+    }
+  }
+}
+
+LightTreeView LightTree::view() const {
+  LightTreeView view = view_;
+  view.nodes = nodes_.data();
+  view.leaf_emitters = leaf_emitters_.data();
+  view.emitter_leaves = emitter_leaves_.empty() ? nullptr : emitter_leaves_.data();
+  return view;
+}
+
+std::size_t LightTree::bytes() const {
+  return nodes_.size() * sizeof(float) +
+         (leaf_emitters_.size() + emitter_leaves_.size()) * sizeof(std::uint32_t);
+}
+
+}  // namespace lumigrove

@@ -1,0 +1,219 @@
+#include "methods/light_tree/light_tree.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cstring>
+
+#include "light_fixtures.h"
+#include "statistics.h"
+
+namespace lumigrove {
+namespace {
+
+using namespace lumigrove::testing;
+
+constexpr int kWidths[] = {2, 4, 8, 16};
+
+TEST(LightTree, BoxesHoldTheirLeavesAndIntensitiesAdd) {
+  for (const int width : kWidths) {
+    const LightWorld world(uneven_mix(), width);
+    const LightTreeView tree = world.tree().view();
+    const LightView lights = world.lights();
+    const std::size_t w = static_cast<std::size_t>(width);
+    std::uint32_t span = 1;  // leaves below a child
+    for (int level = tree.levels - 1; level >= 0; --level, span *= static_cast<std::uint32_t>(width)) {
+      for (std::uint32_t leaf = 0; leaf < tree.count; leaf += span) {
+        const std::uint32_t child = leaf / span;
+        const float* node = tree.nodes + (tree.level_first[level] + child / w) * kNodeRows * w;
+        const auto row = [&](int r) { return node[static_cast<std::size_t>(r) * w + child % w]; };
+        double sum = 0;
+        for (std::uint32_t k = leaf; k < std::min(tree.count, leaf + span); ++k) {
+          const Box3 box = emitter_bounds(lights.emitters[tree.leaf_emitters[k]]);
+          EXPECT_TRUE(row(kLoX) <= box.lo.x && row(kLoY) <= box.lo.y && row(kLoZ) <= box.lo.z);
+          EXPECT_TRUE(row(kHiX) >= box.hi.x && row(kHiY) >= box.hi.y && row(kHiZ) >= box.hi.z);
+          sum += emitter_intensity(lights, tree.leaf_emitters[k]);
+        }
+        EXPECT_NEAR(row(kIntensity), sum, 1e-4 * sum);
+      }
+    }
+  }
+}
+
+TEST(LightTree, LeavesEveryEmitterWithFluxExactlyOnce) {
+  const LightWorld world(punctual_cloud(120));
+  const LightTreeView tree = world.tree().view();
+  std::vector<int> seen(world.lights().emitters.size(), 0);
+  for (std::uint32_t leaf = 0; leaf < tree.count; ++leaf) ++seen[tree.leaf_emitters[leaf]];
+  for (std::uint32_t e = 0; e < seen.size(); ++e) {
+    EXPECT_EQ(seen[e], emitter_flux(world.lights(), e) > 0 ? 1 : 0);
+    EXPECT_EQ(tree.emitter_leaves[e] != kNoEmitter, seen[e] == 1);
+  }
+}
+
+TEST(LightTree, ProbabilitiesSumToOneOrToNothingOnADeadBranch) {
+  for (const NamedScene& named : light_scenes()) {
+    for (const int width : kWidths) {
+      const LightWorld world(named.scene, width);
+      for (const Surface& s : shading_points(60)) {
+        double sum = 0;
+        for (std::uint32_t e = 0; e < world.lights().emitters.size(); ++e)
+          sum += pdf_tree(world.tree().view(), s.position, s.normal, e);
+        // A dead branch below a live one loses its share, so the sum may fall short, never exceed.
+        EXPECT_LE(sum, 1 + 1e-4) << named.name << ", width " << width;
+      }
+    }
+  }
+}
+
+TEST(LightTree, WalkReportsThePdfBitForBit) {
+  for (const NamedScene& named : light_scenes()) {
+    for (const int width : kWidths) {
+      const LightWorld world(named.scene, width);
+      Stream random(77);
+      for (const Surface& s : shading_points(200)) {
+        const vec4 u = random.next();
+        const TreeSample sample = sample_tree(world.tree().view(), s.position, s.normal, vec2(u.x, u.y));
+        if (sample.emitter == kNoEmitter) continue;
+        EXPECT_EQ(sample.pdf, pdf_tree(world.tree().view(), s.position, s.normal, sample.emitter))
+            << named.name;
+      }
+    }
+  }
+}
+
+TEST(LightTree, FrequenciesFollowThePdf) {
+  constexpr int kDraws = 40000;
+  for (const NamedScene& named : light_scenes()) {
+    for (const int width : kWidths) {
+      const LightWorld world(named.scene, width);
+      const LightTreeView tree = world.tree().view();
+      const std::size_t n = world.lights().emitters.size();
+      Stream random(5);
+      for (const Surface& s : shading_points(6, 31)) {
+        std::vector<double> observed(n + 1, 0), expected(n + 1, 0);
+        for (int i = 0; i < kDraws; ++i) {
+          const vec4 u = random.next();
+          const TreeSample sample = sample_tree(tree, s.position, s.normal, vec2(u.x, u.y));
+          ++observed[sample.emitter == kNoEmitter ? n : sample.emitter];
+        }
+        double total = 0;
+        for (std::uint32_t e = 0; e < n; ++e)
+          total += expected[e] = kDraws * static_cast<double>(pdf_tree(tree, s.position, s.normal, e));
+        expected[n] = kDraws - total;  // dead branches
+        if (expected[n] < 1e-3 * kDraws && observed[n] == 0) expected[n] = 0;
+        // 96 tests in all: 1e-5 each keeps false alarms below one in a thousand.
+        EXPECT_GT(chi_square_p_value(observed, expected), 1e-5) << named.name << ", width " << width;
+      }
+    }
+  }
+}
+
+// Property: light that can arrive has positive probability, at points inside and outside boxes and at grazing
+// angles.
+TEST(LightTree, ContributionImpliesProbability) {
+  for (const NamedScene& named : light_scenes()) {
+    for (const int width : kWidths) {
+      const LightWorld world(named.scene, width);
+      const LightSampler sampler = world.sampler(LightChoice::kTree);
+      Stream random(8);
+      for (const Surface& s : shading_points(300, 12)) {
+        for (std::uint32_t e = 0; e < sampler.lights.emitters.size(); ++e) {
+          const vec4 u = random.next();
+          const EmitterPoint point =
+              sample_emitter_point(sampler.scene, sampler.lights, e, s.position, vec2(u.x, u.y));
+          if (!(max_component(point.incident) > 0) || !(glm::dot(point.wi, s.normal) > 1e-5f)) continue;
+          ASSERT_GT(pdf_tree(sampler.tree, s.position, s.normal, e), 0.0f) << named.name << ", emitter " << e;
+        }
+      }
+    }
+  }
+}
+
+TEST(LightTree, PointsOnALightAreSampledSafely) {
+  const Scene scene = punctual_cloud(50);
+  const LightWorld world(scene);
+  for (const Emitter& emitter : world.lights().emitters) {
+    const TreeSample sample = sample_tree(world.tree().view(), emitter.p0, vec3(0, 1, 0), vec2(0.5f, 0.5f));
+    EXPECT_TRUE(is_finite(sample.pdf));
+  }
+}
+
+TEST(LightTree, OneLightIsAlwaysFoundAndNoLightNever) {
+  for (const int width : kWidths) {
+    const LightWorld one(triangle_cloud(4, 0.1f), width);
+    Scene single;
+    add_node(single, {add_mesh(single, add_material(single, vec3(1)),
+                               {vec3(0, 1, 0), vec3(1, 1, 0), vec3(0, 1, 1)})});
+    const LightWorld alone(single, width);
+    const TreeSample found = sample_tree(alone.tree().view(), vec3(0), vec3(0, 1, 0), vec2(0.99f, 0));
+    EXPECT_EQ(found.emitter, 0u);
+    EXPECT_EQ(found.pdf, 1.0f);
+    const LightWorld dark(Scene{}, width);
+    EXPECT_EQ(sample_tree(dark.tree().view(), vec3(0), vec3(0, 1, 0), vec2(0.5f)).emitter, kNoEmitter);
+  }
+}
+
+TEST(LightTree, CoincidentLightsShareEqually) {
+  Scene scene;
+  add_node(scene, {add_mesh(scene, add_material(scene, vec3(0)), {vec3(-1), vec3(1), vec3(1, -1, 1)})});
+  for (int i = 0; i < 37; ++i) add_light(scene, {}, vec3(0, 2, 0));
+  for (const int width : kWidths) {
+    const LightWorld world(scene, width);
+    for (std::uint32_t e = 0; e < 37; ++e)
+      EXPECT_NEAR(pdf_tree(world.tree().view(), vec3(1, 0, 0), vec3(0, 1, 0), e), 1.0 / 37, 1e-5);
+  }
+}
+
+TEST(LightTree, SameBitsForAnyThreadCount) {
+  const Scene scene = triangle_cloud(20000, 0.01f);
+  std::vector<std::vector<float>> nodes;
+  for (const std::size_t threads : {1u, 2u, 4u}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const LightWorld world(scene);
+    const LightTreeView tree = world.tree().view();
+    nodes.emplace_back(tree.nodes,
+                       tree.nodes + (world.tree().bytes() - 8 * std::size_t{tree.count}) / sizeof(float));
+  }
+  EXPECT_EQ(nodes[0], nodes[1]);
+  EXPECT_EQ(nodes[0], nodes[2]);
+}
+
+TEST(LightTree, ScalingTheSceneChangesNoProbability) {
+  constexpr float kScale = 1024;  // a power of two: exact in floating point
+  Scene scene = uneven_mix(), scaled = scene;
+  for (Mesh& mesh : scaled.meshes)
+    for (vec3& p : mesh.positions) p *= kScale;
+  for (Node& node : scaled.nodes) node.translation *= kScale;
+  for (PunctualLight& light : scaled.lights) light.color *= kScale * kScale;  // as flux of surfaces grows
+  const LightWorld a(scene), b(scaled);
+  for (const Surface& s : shading_points(100))
+    for (std::uint32_t e = 0; e < a.lights().emitters.size(); ++e)
+      EXPECT_EQ(pdf_tree(a.tree().view(), s.position, s.normal, e),
+                pdf_tree(b.tree().view(), s.position * kScale, s.normal, e));
+}
+
+TEST(LightTree, AMillionLightsStayWithinTheirBytesAndAreReachable) {
+  const LightWorld world(triangle_cloud(1000000, 0.001f));
+  const LightTreeView tree = world.tree().view();
+  EXPECT_EQ(tree.count, 1000000u);
+  const double bytes =
+      static_cast<double>(world.tree().bytes() - 4 * tree.count + tree.count * sizeof(Emitter));
+  EXPECT_LE(bytes / tree.count, 80.0);  // without the optional emitter -> leaf table
+  Stream random(3);
+  for (const Surface& s : shading_points(1000)) {
+    const vec4 u = random.next();
+    const TreeSample sample = sample_tree(tree, s.position, s.normal, vec2(u.x, u.y));
+    if (sample.emitter == kNoEmitter) continue;
+    EXPECT_GT(sample.pdf, 0.0f);
+    EXPECT_LT(sample.emitter, tree.count);
+  }
+}
+
+TEST(LightTree, OtherWidthsAreRefused) {
+  LightTree tree;
+  EXPECT_THROW(tree.build(LightView{}, 3, false), Error);
+}
+
+}  // namespace
+}  // namespace lumigrove
