@@ -13,6 +13,7 @@
 #include "base/rng.h"
 #include "device/device.h"
 #include "frame/emission_kernel.h"
+#include "methods/reference/path.h"
 #include "scene/surface_kernel.h"
 
 namespace lumigrove {
@@ -74,6 +75,7 @@ struct TileBuffers {
   std::vector<std::uint32_t> pixels;
   std::vector<vec3> direct, indirect, emission;
   DirectBuffers direct_buffers;
+  PathBuffers path_buffers;
   double camera_ms = 0, primary_ms = 0, surface_ms = 0, film_ms = 0;
   std::uint64_t primary_rays = 0;
 };
@@ -99,6 +101,18 @@ void timed(double& ms, const Step& step) {
   const auto start = Clock::now();
   step();
   ms += milliseconds_since(start);
+}
+
+// Paths go on from the first hits as settings.indirect asks; with MIS their first ray also finds direct light.
+PathTracing make_path_tracing(const Settings& settings, const DirectLighting& direct) {
+  PathTracing tracing;
+  tracing.lighting = direct;
+  tracing.lighting.spp = 1;  // direct.spp is for what the camera sees
+  tracing.max_bounces = settings.indirect.transport == Transport::kPath ? settings.indirect.max_bounces : 0;
+  tracing.roulette_start = settings.indirect.roulette_start;
+  tracing.light_scale = settings.light_scale;
+  tracing.force_diffuse = settings.force_diffuse;
+  return tracing;
 }
 
 // G-buffer · direct light · indirect light · film, for the pixels of one tile.
@@ -131,6 +145,8 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
   });
 
   add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
+  add_path_light(make_path_tracing(settings, direct), b.surfaces, b.pixels, b.path_buffers, b.direct,
+                 b.indirect);
 
   timed(b.film_ms, [&] {
     launch(count, FilmKernel{sample,
@@ -260,12 +276,20 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     sum.direct_buffers.select_ms += b.direct_buffers.select_ms;
     sum.direct_buffers.trace_ms += b.direct_buffers.trace_ms;
     sum.direct_buffers.rays += b.direct_buffers.rays;
+    sum.path_buffers.add_counters(b.path_buffers);
   }
   add_pass(stats, "camera rays", sum.camera_ms, 0);
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
   add_pass(stats, "surfaces", sum.surface_ms, 0);
   add_pass(stats, "light selection", sum.direct_buffers.select_ms, 0);
   add_pass(stats, "shadow rays", sum.direct_buffers.trace_ms, sum.direct_buffers.rays);
+  if (settings.direct.mis || settings.indirect.transport == Transport::kPath) {
+    const PathBuffers& path = sum.path_buffers;
+    add_pass(stats, "path rays", path.trace_ms, path.path_rays);
+    add_pass(stats, "path surfaces", path.scatter_ms + path.arrive_ms, 0);
+    add_pass(stats, "path light selection", path.direct.select_ms, 0);
+    add_pass(stats, "path shadow rays", path.direct.trace_ms, path.direct.rays);
+  }
   add_pass(stats, "film", sum.film_ms, 0);
 }
 

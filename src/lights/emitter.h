@@ -6,7 +6,7 @@
 
 #include "base/vec.h"
 #include "lights/light_set.h"
-#include "scene/texture.h"
+#include "scene/interpolate.h"
 
 namespace lumigrove {
 
@@ -97,22 +97,32 @@ LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitte
   return p;
 }
 
-LUMI_HD inline vec3 emissive_texture_at(const SceneView& scene, const EmissiveInstance& emissive,
-                                        const Emitter& e, std::uint32_t index, float b1, float b2) {
+// A point of a triangle emitter as its mesh counts vertices: p0 + u (p1 - p0) + v (p2 - p0).
+struct MeshPoint {
+  int mesh;
+  std::uint32_t triangle;
+  float u, v;
+};
+LUMI_HD inline MeshPoint mesh_point(const SceneView& scene, const EmissiveInstance& emissive,
+                                    const Emitter& e, std::uint32_t index, float b1, float b2) {
   const InstanceView& instance = scene.instances[e.source];
-  const MeshView& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh)];
-  const MaterialView& material = scene.materials[static_cast<std::size_t>(mesh.material)];
   const std::uint32_t rank = index - emissive.first;
-  const uvec3 v = mesh.triangles[emissive.triangles ? emissive.triangles[rank] : rank];
-  if (instance.flip < 0) {  // e1 and e2 changed places in a mirrored instance
-    const float swap = b1;
-    b1 = b2;
-    b2 = swap;
-  }
-  const auto at = [&](const vec2* uv) {
-    return uv ? uv[v.x] * (1 - b1 - b2) + uv[v.y] * b1 + uv[v.z] * b2 : vec2(0);
-  };
-  return vec3(sample_texture(scene, material.emissive_texture, at(mesh.uv0), at(mesh.uv1)));
+  const std::uint32_t triangle = emissive.triangles ? emissive.triangles[rank] : rank;
+  const bool swapped = instance.flip < 0;  // e1 and e2 changed places in a mirrored instance
+  return {instance.mesh, triangle, swapped ? b2 : b1, swapped ? b1 : b2};
+}
+
+LUMI_HD inline vec3 emissive_texture_at(const SceneView& scene, const MeshPoint& point) {
+  const MeshView& mesh = scene.meshes[static_cast<std::size_t>(point.mesh)];
+  const MaterialView& material = scene.materials[static_cast<std::size_t>(mesh.material)];
+  const TexturePoint at = texture_point(mesh, mesh.triangles[point.triangle], point.u, point.v);
+  return vec3(sample_texture(scene, material.emissive_texture, at.uv0, at.uv1));
+}
+
+// Is the point in a hole of an alpha mask? A ray passes there, so no light may leave.
+LUMI_HD inline bool is_cut_out(const SceneView& scene, const MeshPoint& point) {
+  const MeshView& mesh = scene.meshes[static_cast<std::size_t>(point.mesh)];
+  return is_cut_out(scene, mesh, point.triangle, point.u, point.v);
 }
 
 LUMI_HD inline EmitterPoint triangle_point(const SceneView& scene, const LightView& lights, const Emitter& e,
@@ -133,7 +143,11 @@ LUMI_HD inline EmitterPoint triangle_point(const SceneView& scene, const LightVi
   p.distance = d2 * inverse;
   p.wi = to_light * inverse;
   p.incident = instance.radiance;
-  if (instance.textured) p.incident *= emissive_texture_at(scene, instance, e, index, b1, b2);
+  if (instance.textured || instance.masked) {
+    const MeshPoint point = mesh_point(scene, instance, e, index, b1, b2);
+    if (instance.textured) p.incident *= emissive_texture_at(scene, point);
+    if (instance.masked && is_cut_out(scene, point)) p.incident = vec3(0);
+  }
   p.area_to_solid = d2 / cos_light;
   return p;
 }

@@ -184,6 +184,7 @@ void LightSet::gather(const SceneArrays& arrays, const SceneState& state, const 
     instances_[i].count = emission.count;
     instances_[i].textured = emission.textured;
     instances_[i].double_sided = material.double_sided;
+    instances_[i].masked = material.masked;
     if (emission.textured) {
       instances_[i].triangles = emission.triangles.data();
       instances_[i].ranks = emission.ranks.data();

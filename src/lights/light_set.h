@@ -41,6 +41,7 @@ struct EmissiveInstance {
   std::uint32_t count = 0;
   std::uint32_t stable_base = 0;  // stable id of the mesh's triangle 0
   bool textured = false, double_sided = false;
+  bool masked = false;             // has holes; its flux counts them as shining
 
   static constexpr std::uint32_t kNoEmitters = 0xffffffffu;
 };

@@ -11,7 +11,12 @@
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "device/cuda/launch.h"
+#include "frame/emission_kernel.h"
 #include "lights/light_set.h"
+#include "methods/light_sampling/direct_lighting_kernel.h"
+#include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/light_tree/light_tree_kernel.h"
+#include "methods/reference/path_kernel.h"
 #include "scene/bsdf.h"
 #include "scene/camera_kernel.h"
 #include "scene/scene_view.h"
@@ -80,5 +85,18 @@ template void cuda::launch<WarpsKernel>(int, const WarpsKernel&, cudaStream_t);
 template void cuda::launch<BsdfKernel>(int, const BsdfKernel&, cudaStream_t);
 template void cuda::launch<CameraKernel>(int, const CameraKernel&, cudaStream_t);
 template void cuda::launch<SurfaceKernel>(int, const SurfaceKernel&, cudaStream_t);
+template void cuda::launch<EmissionKernel>(int, const EmissionKernel&, cudaStream_t);
+template void cuda::launch<MortonKernel>(int, const MortonKernel&, cudaStream_t);
+template void cuda::launch<LeafNodeKernel<8>>(int, const LeafNodeKernel<8>&, cudaStream_t);
+template void cuda::launch<InnerNodeKernel<8>>(int, const InnerNodeKernel<8>&, cudaStream_t);
+template void cuda::launch<DirectLightKernel>(int, const DirectLightKernel&, cudaStream_t);
+template void cuda::launch<AddUnoccludedKernel>(int, const AddUnoccludedKernel&, cudaStream_t);
+template void cuda::launch<PathStartKernel>(int, const PathStartKernel&, cudaStream_t);
+template void cuda::launch<PathScatterKernel>(int, const PathScatterKernel&, cudaStream_t);
+template void cuda::launch<PathEscapeKernel>(int, const PathEscapeKernel&, cudaStream_t);
+template void cuda::launch<PathArriveKernel>(int, const PathArriveKernel&, cudaStream_t);
+template void cuda::launch<PathEmissionKernel>(int, const PathEmissionKernel&, cudaStream_t);
+template void cuda::launch<PathPixelsKernel>(int, const PathPixelsKernel&, cudaStream_t);
+template void cuda::launch<PathLightKernel>(int, const PathLightKernel&, cudaStream_t);
 
 }  // namespace lumigrove
