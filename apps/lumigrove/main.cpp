@@ -1,1 +1,3 @@
-int main() { return 0; }
+#include "tool.h"
+
+int main(int argc, char** argv) { return lumigrove::run_tool(argc, argv); }
