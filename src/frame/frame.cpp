@@ -12,6 +12,7 @@
 
 #include "base/rng.h"
 #include "device/device.h"
+#include "frame/camera.h"
 #include "frame/emission_kernel.h"
 #include "methods/reference/path.h"
 #include "scene/surface_kernel.h"
@@ -25,45 +26,7 @@ double milliseconds_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// --- the camera
-// ------------------------------------------------------------------------------------------------
-
-CameraInstance look_at(const ViewSettings& view, Camera camera) {
-  CameraInstance result;
-  const vec3 forward = view.look_at - view.position;
-  const vec3 right = glm::cross(forward, view.up);
-  if (!(length_squared(forward) > 0) || !(length_squared(right) > 0))
-    throw Error("the view looks along its own up vector or at its own position; change --vp, --vi or --vu");
-  result.camera = std::move(camera);
-  result.position = view.position;
-  result.forward = glm::normalize(forward);
-  result.right = glm::normalize(right);
-  result.up = glm::cross(result.right, result.forward);
-  return result;
-}
-
-CameraInstance choose_camera(const SceneState& state, const Settings& settings) {
-  CameraInstance camera = state.cameras.empty() ? default_camera(state) : state.cameras.front();
-  if (!settings.camera.empty()) {
-    const auto named = std::find_if(state.cameras.begin(), state.cameras.end(), [&](const CameraInstance& c) {
-      return c.camera.name == settings.camera;
-    });
-    if (named == state.cameras.end()) {
-      std::string names;
-      for (const CameraInstance& c : state.cameras)
-        names += (names.empty() ? "" : ", ") + ("'" + c.camera.name + "'");
-      throw Error("the scene has no camera '" + settings.camera + "'; " +
-                  (names.empty() ? "it has none" : "it has " + names));
-    }
-    camera = *named;
-  }
-  if (settings.view) camera = look_at(*settings.view, camera.camera);
-  if (settings.fov) camera.camera.vertical_fov = *settings.fov * (kPi / 180);
-  return camera;
-}
-
-// --- one tile
-// ----------------------------------------------------------------------------------------------------
+// --- one tile ----------------------------------------------------------------------------------------------
 
 // A tile's working set stays in a core's cache between the steps.
 constexpr int kTileSize = 64;
@@ -174,8 +137,7 @@ void add_pass(RenderStats& stats, const char* name, double thread_ms, std::uint6
 
 }  // namespace
 
-// --- the world
-// -----------------------------------------------------------------------------------------------------
+// --- the world ---------------------------------------------------------------------------------------------
 
 std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats) {
   SceneState state = evaluate(scene, settings.time);
@@ -184,9 +146,9 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   const auto start = Clock::now();
   Tracer tracer(scene, state);
   stats.structures.push_back(
-      {"acceleration structure", milliseconds_since(start), tracer.bytes(), state.instances.size()});
+      {kAccelerationStructure, milliseconds_since(start), tracer.bytes(), state.instances.size()});
   LightSet lights(scene, arrays);
-  CameraInstance camera = choose_camera(state, settings);
+  CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
       std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, std::move(camera)});
   build_lights(*world, settings, stats);
@@ -245,8 +207,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   return direct;
 }
 
-// --- one camera sample of the whole image
-// ------------------------------------------------------------------------
+// --- one camera sample of the whole image ------------------------------------------------------------------
 
 void render_sample(const World& world, const Settings& settings, int sample, Film& film, RenderStats& stats) {
   const CameraView camera = make_camera_view(world.camera, settings.width, settings.height);
