@@ -8,6 +8,7 @@
 
 #include "bench.h"
 #include "trace/embree_api.h"
+#include "trace/ray.h"
 
 namespace lumigrove::bench {
 

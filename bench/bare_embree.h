@@ -8,11 +8,12 @@
 #include <vector>
 
 #include "lumigrove/scene.h"
-#include "trace/ray.h"
+
+namespace lumigrove {
+struct Ray;
+}
 
 namespace lumigrove::bench {
-
-struct RaySet;
 
 class BareEmbree {
  public:

@@ -33,6 +33,12 @@ struct Benchmark {
 const std::vector<Benchmark>& benchmarks();  // registry.cpp
 
 // One file each.
+Result frame_floor_night_city(const Options& options);
+Result frame_floor_cornell_lights(const Options& options);
+Result build_tree_1m(const Options& options);
+Result sample_scaling(const Options& options);
+Result memory_per_emitter(const Options& options);
+Result error_tree_power(const Options& options);
 Result sort_radix_1m(const Options& options);
 
 inline double median(std::vector<double> values) {
@@ -46,6 +52,13 @@ double time_ms(const Function& function) {
   const auto start = std::chrono::steady_clock::now();
   function();
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+template <class Function>
+double median_ms(int runs, const Function& function) {
+  std::vector<double> times;
+  for (int i = 0; i < runs; ++i) times.push_back(time_ms(function));
+  return median(times);
 }
 
 struct PairTimes {
