@@ -264,8 +264,7 @@ TEST(Surface, EpsilonClearsSelfIntersectionWithoutLeaking) {
     if (trial % 6 == 5) {  // traced as an instance, when there is much else
       state.instances[0].moves = true;
       Mesh bulk;
-      bulk.positions = {m[3] + vec3(100, 0, 0) * size, m[3] + vec3(101, 0, 0) * size,
-                        m[3] + vec3(100, 1, 0) * size};
+      bulk.positions.assign(3, vec3(std::numeric_limits<float>::quiet_NaN()));
       bulk.triangles.assign(kMaxRebuiltSoup, uvec3(0, 1, 2));
       scene.meshes.push_back(bulk);
       state.instances[1].mesh = 1;

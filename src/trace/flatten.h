@@ -14,8 +14,9 @@ namespace lumigrove {
 // several times are baked too, smallest first, while all copies together stay below this many triangles.
 inline constexpr std::size_t kMaxBakedCopies = std::size_t{1} << 20;
 
-// What moves is baked as well while the whole soup has no more triangles than this and is quick to rebuild.
-inline constexpr std::size_t kMaxRebuiltSoup = std::size_t{1} << 18;
+// What moves is baked as well while the whole soup has no more triangles than this: a rebuild takes under a second
+// of one core for a million.
+inline constexpr std::size_t kMaxRebuiltSoup = std::size_t{1} << 20;
 
 struct TracePlan {
   std::vector<std::uint32_t> baked;      // instances whose triangles join the opaque soup
