@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -21,7 +22,7 @@ class Compare : public testing::Test {
  protected:
   void SetUp() override {
     const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    folder_ = fs::path(testing::TempDir()) / ("lumigrove_compare_" + name);
+    folder_ = fs::path(testing::TempDir()) / ("lumigrove_compare_" + std::to_string(getpid()) + name);
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     write("ref.exr", 1);
@@ -200,7 +201,7 @@ TEST(Difference, HeatMapIsCloseToMagma) {
 }
 
 TEST(Difference, PicturesAreWrittenAsTheyAre) {
-  const fs::path file = fs::path(testing::TempDir()) / "lumigrove_picture.png";
+  const fs::path file = fs::path(testing::TempDir()) / ("lumigrove_picture_" + std::to_string(getpid()) + ".png");
   std::vector<float> picture;
   for (int i = 0; i < 255; ++i) picture.push_back(static_cast<float>(i) / 255);
   write_picture(picture, 85, 1, file);

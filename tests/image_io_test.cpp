@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -21,7 +22,7 @@ class ImageIo : public testing::Test {
  protected:
   void SetUp() override {
     const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    folder_ = fs::path(testing::TempDir()) / ("lumigrove_image_io_" + name);
+    folder_ = fs::path(testing::TempDir()) / ("lumigrove_image_io_" + std::to_string(getpid()) + name);
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
