@@ -21,6 +21,10 @@ namespace {
 // Rays of one task.
 constexpr std::size_t kBlock = 1024;
 
+// A batch up to this size, such as a tile of an image, is traced by the calling thread: whoever asks for so few has
+// other batches for the other threads.
+constexpr std::size_t kSerialBatch = 8 * kBlock;
+
 // Embree's own bound on coordinates (FLT_LARGE); its filtering of rays beyond it may be compiled out.
 constexpr float kMaxCoordinate = 1.8e18f;
 
@@ -416,10 +420,13 @@ namespace {
 
 template <class Block>
 void for_blocks(std::size_t count, const Block& block) {
-  tbb::parallel_for(std::size_t{0}, (count + kBlock - 1) / kBlock, [&](std::size_t b) {
-    const std::size_t first = b * kBlock;
-    block(first, std::min(kBlock, count - first));
-  });
+  const auto one = [&](std::size_t b) { block(b * kBlock, std::min(kBlock, count - b * kBlock)); };
+  const std::size_t blocks = (count + kBlock - 1) / kBlock;
+  if (count <= kSerialBatch) {
+    for (std::size_t b = 0; b < blocks; ++b) one(b);
+  } else {
+    tbb::parallel_for(std::size_t{0}, blocks, one);
+  }
 }
 
 }  // namespace
