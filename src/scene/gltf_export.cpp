@@ -17,6 +17,7 @@
 #include "base/atomic_file.h"
 #include "base/vec.h"
 #include "lumigrove/renderer.h"
+#include "scene/asset_files.h"
 #include "scene/image_encode.h"
 
 namespace lumigrove {
@@ -486,7 +487,7 @@ void GltfWriter::write(const std::filesystem::path& file, bool binary) {
 }  // namespace
 
 std::vector<std::string> export_gltf(const Scene& scene, const std::filesystem::path& file) {
-  const std::string extension = file.extension().string();
+  const std::string extension = lower_case_extension(file);
   if (extension != ".glb" && extension != ".gltf")
     throw Error(fmt::format("{}: a glTF file must end in .glb or .gltf", file.string()));
   GltfWriter writer(scene);

@@ -25,6 +25,7 @@
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "lumigrove/renderer.h"
+#include "scene/asset_files.h"
 #include "scene/image_encode.h"
 
 namespace lumigrove {
@@ -575,7 +576,7 @@ std::vector<std::string> PbrtWriter::take_warnings() { return {warnings_.begin()
 
 std::vector<std::string> export_pbrt(const Scene& scene, double seconds, int camera, int width, int height,
                                      int spp, const fs::path& file, bool force_diffuse) {
-  if (file.extension() != ".pbrt")
+  if (lower_case_extension(file) != ".pbrt")
     throw Error(fmt::format("{}: a pbrt file must end in .pbrt", file.string()));
   if (width < 1 || height < 1 || spp < 1)
     throw Error(fmt::format("{}: image size and samples must be at least 1, not {} x {} and {}",
