@@ -30,8 +30,9 @@ TEST(LightTree, BoxesHoldTheirLeavesAndIntensitiesAdd) {
         double sum = 0;
         for (std::uint32_t k = leaf; k < std::min(tree.count, leaf + span); ++k) {
           const Box3 box = emitter_bounds(lights.emitters[tree.leaf_emitters[k]]);
-          EXPECT_TRUE(row(kLoX) <= box.lo.x && row(kLoY) <= box.lo.y && row(kLoZ) <= box.lo.z);
-          EXPECT_TRUE(row(kHiX) >= box.hi.x && row(kHiY) >= box.hi.y && row(kHiZ) >= box.hi.z);
+          const vec3 centre(row(kCentreX), row(kCentreY), row(kCentreZ)), half(row(kHalfX), row(kHalfY), row(kHalfZ));
+          EXPECT_TRUE(glm::all(glm::lessThanEqual(centre - half, box.lo)));
+          EXPECT_TRUE(glm::all(glm::greaterThanEqual(centre + half, box.hi)));
           sum += emitter_intensity(lights, tree.leaf_emitters[k]);
         }
         EXPECT_NEAR(row(kIntensity), sum, 1e-4 * sum);

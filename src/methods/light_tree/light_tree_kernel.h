@@ -40,7 +40,8 @@ inline constexpr int kMaxTreeLevels = 32;
 inline constexpr std::uint32_t kNoEmitter = 0xffffffffu;
 
 // Node k of level l holds, for children W*k..W*k+W-1 of level l+1, seven rows of W floats.
-enum NodeRow : int { kLoX, kLoY, kLoZ, kHiX, kHiY, kHiZ, kIntensity, kNodeRows };
+// Boxes as centre and half extent (rounded outwards): distance and horizon then need a third fewer operations.
+enum NodeRow : int { kCentreX, kCentreY, kCentreZ, kHalfX, kHalfY, kHalfZ, kIntensity, kNodeRows };
 
 struct LightTreeView {
   const float* nodes = nullptr;
@@ -64,45 +65,40 @@ LUMI_HD inline float sum_lanes(const float* values) {
   return partial[0];
 }
 
-// Equations 1 and 2 at once for the W children of a node. Returns false, leaving `probability` undefined,
-// when no child can contribute.
+// Equations 1 and 2 at once for the W children of a node. Returns false, leaving `probability` undefined, when no
+// child can contribute.
 template <int W>
-LUMI_HD inline bool child_probabilities(const float* node, float inside2, vec3 x, vec3 n,
-                                        float* probability) {
-  const float* lo_x = node + kLoX * W;
-  const float* lo_y = node + kLoY * W;
-  const float* lo_z = node + kLoZ * W;
-  const float* hi_x = node + kHiX * W;
-  const float* hi_y = node + kHiY * W;
-  const float* hi_z = node + kHiZ * W;
+LUMI_HD inline bool child_probabilities(const float* node, float inside2, vec3 x, vec3 n, float* probability) {
+  const float* centre_x = node + kCentreX * W;
+  const float* centre_y = node + kCentreY * W;
+  const float* centre_z = node + kCentreZ * W;
+  const float* half_x = node + kHalfX * W;
+  const float* half_y = node + kHalfY * W;
+  const float* half_z = node + kHalfZ * W;
   const float* intensity = node + kIntensity * W;
-  // The corner farthest along n decides whether any of the box is above the horizon.
-  const float* top_x = n.x > 0 ? hi_x : lo_x;
-  const float* top_y = n.y > 0 ? hi_y : lo_y;
-  const float* top_z = n.z > 0 ? hi_z : lo_z;
+  const vec3 abs_n = glm::abs(n);
 
   alignas(64) float near_weight[W], far_weight[W], inside_weight[W];
   for (int c = 0; c < W; ++c) {
-    const float dx = glm::max(glm::max(lo_x[c] - x.x, 0.0f), x.x - hi_x[c]);
-    const float dy = glm::max(glm::max(lo_y[c] - x.y, 0.0f), x.y - hi_y[c]);
-    const float dz = glm::max(glm::max(lo_z[c] - x.z, 0.0f), x.z - hi_z[c]);
-    const float sx = lo_x[c] > x.x ? dx : -dx, sy = lo_y[c] > x.y ? dy : -dy, sz = lo_z[c] > x.z ? dz : -dz;
-    const float near2 = dx * dx + dy * dy + dz * dz;
-    const float fx = glm::max(x.x - lo_x[c], hi_x[c] - x.x);
-    const float fy = glm::max(x.y - lo_y[c], hi_y[c] - x.y);
-    const float fz = glm::max(x.z - lo_z[c], hi_z[c] - x.z);
-    const float far2 = glm::max(fx * fx + fy * fy + fz * fz, inside2);
-
-    const float hx = n.x * (top_x[c] - x.x), hy = n.y * (top_y[c] - x.y), hz = n.z * (top_z[c] - x.z);
-    const float height = hx + hy + hz + 1e-6f * (glm::abs(hx) + glm::abs(hy) + glm::abs(hz));
-    const float along = n.x * sx + n.y * sy + n.z * sz;
+    const float dx = centre_x[c] - x.x, dy = centre_y[c] - x.y, dz = centre_z[c] - x.z;
+    const float ax = glm::abs(dx), ay = glm::abs(dy), az = glm::abs(dz);
+    const float px = glm::max(ax - half_x[c], 0.0f), py = glm::max(ay - half_y[c], 0.0f), pz = glm::max(az - half_z[c], 0.0f);
+    const float fx = ax + half_x[c], fy = ay + half_y[c], fz = az + half_z[c];
+    const float near2 = px * px + py * py + pz * pz;
+    const float far2 = fx * fx + fy * fy + fz * fz;
+    // Highest corner of the box above the tangent plane, and height of its nearest point.
+    const float height = n.x * dx + n.y * dy + n.z * dz + abs_n.x * half_x[c] + abs_n.y * half_y[c] + abs_n.z * half_z[c] +
+                         1e-6f * (fx + fy + fz);
+    const float along = n.x * (dx < 0 ? -px : px) + n.y * (dy < 0 ? -py : py) + n.z * (dz < 0 ? -pz : pz);
     const float tangent2 = glm::max(near2 - along * along, 0.0f);
-    const float cosine_bound = height > 0 ? height / glm::sqrt(tangent2 + height * height) : 0.0f;
-
-    const float weight = intensity[c] * cosine_bound;
-    inside_weight[c] = near2 <= inside2 ? weight : 0.0f;
-    near_weight[c] = weight / glm::max(near2, inside2);
-    far_weight[c] = weight / far2;
+    // weight = I cos; one division serves weight / near2 and weight / far2.
+    const float near_floor = glm::max(near2, inside2), far_floor = glm::max(far2, inside2);
+    const float above = glm::max(height, 0.0f);
+    const float length = glm::sqrt(tangent2 + above * above);
+    const float share = intensity[c] * above / glm::max(length * near_floor * far_floor, 1e-37f);
+    near_weight[c] = share * far_floor;
+    far_weight[c] = share * near_floor;
+    inside_weight[c] = near2 <= inside2 ? near_weight[c] * near_floor : 0.0f;
   }
   const float far_sum = sum_lanes<W>(far_weight);
   if (!(far_sum > 1e-37f)) return false;  // also keeps its reciprocal finite
@@ -112,6 +108,28 @@ LUMI_HD inline bool child_probabilities(const float* node, float inside2, vec3 x
   const float far_scale = 0.5f / far_sum;
   for (int c = 0; c < W; ++c) probability[c] = nearest[c] * near_scale + far_weight[c] * far_scale;
   return true;
+}
+
+// Index of one of W values chosen in proportion to them, without branches: descends a binary tree of partial sums.
+// `r` in [0,1) comes back rescaled to [0,1) for the next choice.
+template <int W>
+LUMI_HD inline int choose_lane(const float* values, float& r) {
+  alignas(64) float sums[2 * W];  // W values, then their sums by halves: W/2, W/4, ... 1
+  for (int c = 0; c < W; ++c) sums[c] = values[c];
+  int at = 0;
+  for (int half = W / 2; half > 0; at += 2 * half, half /= 2)
+    for (int c = 0; c < half; ++c) sums[at + 2 * half + c] = sums[at + c] + sums[at + half + c];
+  r *= sums[at];
+  int lane = 0;
+  for (int half = 1; half < W; half *= 2) {  // half: lanes of the level above
+    at -= 2 * half;
+    const float left = sums[at + lane], right = sums[at + half + lane];
+    const bool take_right = (r >= left && right > 0) || !(left > 0);
+    r -= take_right ? left : 0.0f;
+    lane += take_right ? half : 0;
+  }
+  r = glm::clamp(r / values[lane], 0.0f, 0x1.fffffep-1f);
+  return lane;
 }
 
 struct TreeSample {
@@ -132,18 +150,8 @@ LUMI_HD inline TreeSample sample_light_tree(const LightTreeView& tree, vec3 x, v
     const float* data =
         tree.nodes + static_cast<std::size_t>(tree.level_first[level] + node) * (kNodeRows * W);
     if (!child_probabilities<W>(data, tree.inside2, x, n, probability)) return {};
-    float below = 0;
-    int chosen = -1;
-    float chosen_below = 0;
-    for (int c = 0; c < W; ++c) {  // last child of positive probability that starts at or below r
-      const bool take = probability[c] > 0 && below <= r;
-      chosen = take ? c : chosen;
-      chosen_below = take ? below : chosen_below;
-      below += probability[c];
-    }
-    const float p = probability[chosen];
-    r = glm::clamp((r - chosen_below) / p, 0.0f, 0x1.fffffep-1f);
-    pdf *= p;
+    const int chosen = choose_lane<W>(probability, r);
+    pdf *= probability[chosen];
     node = node * W + static_cast<std::uint32_t>(chosen);
   }
   return {tree.leaf_emitters[node], pdf};
@@ -192,12 +200,15 @@ struct MortonKernel {
 // Writes child `c` of the node at `data`.
 template <int W>
 LUMI_HD inline void store_child(float* data, int c, Box3 box, float intensity) {
-  data[kLoX * W + c] = box.lo.x;
-  data[kLoY * W + c] = box.lo.y;
-  data[kLoZ * W + c] = box.lo.z;
-  data[kHiX * W + c] = box.hi.x;
-  data[kHiY * W + c] = box.hi.y;
-  data[kHiZ * W + c] = box.hi.z;
+  const vec3 centre = box.centre();
+  // The larger side, and a little more than rounding can have taken off.
+  const vec3 half = glm::max(box.hi - centre, centre - box.lo) * (1 + 1e-6f) + glm::abs(centre) * 1e-7f;
+  data[kCentreX * W + c] = centre.x;
+  data[kCentreY * W + c] = centre.y;
+  data[kCentreZ * W + c] = centre.z;
+  data[kHalfX * W + c] = half.x;
+  data[kHalfY * W + c] = half.y;
+  data[kHalfZ * W + c] = half.z;
   data[kIntensity * W + c] = intensity;
 }
 
@@ -251,9 +262,9 @@ struct InnerNodeKernel {
       Box3 box;
       float intensity = 0;
       for (int k = 0; k < W; ++k) {
-        const vec3 lo(from[kLoX * W + k], from[kLoY * W + k], from[kLoZ * W + k]);
-        const vec3 hi(from[kHiX * W + k], from[kHiY * W + k], from[kHiZ * W + k]);
-        box = unite(box, Box3{lo, hi});  // bogus children repeat a real box
+        const vec3 centre(from[kCentreX * W + k], from[kCentreY * W + k], from[kCentreZ * W + k]);
+        const vec3 half(from[kHalfX * W + k], from[kHalfY * W + k], from[kHalfZ * W + k]);
+        box = unite(box, Box3{centre - half, centre + half});  // bogus children repeat a real box
         intensity += from[kIntensity * W + k];
       }
       if (c == 0) filler = box;
