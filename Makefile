@@ -5,6 +5,7 @@ ARCH ?= native
 JOBS ?= $(shell nproc)
 WERROR := $(if $(CI),ON,OFF)
 RELEASE := build/release
+SANITIZE := build/sanitize
 LUMIGROVE := $(RELEASE)/apps/lumigrove/lumigrove
 # Looked up when used, because `make dependencies` may have just installed something.
 CCACHE = $(if $(shell command -v ccache),-DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
@@ -38,9 +39,13 @@ demo: build
 	@mkdir -p out
 	$(LUMIGROVE) render night-city --size 1280 720 --spp 16 -o out/night-city.exr -o out/night-city.png --stats
 
+# The tests of everything that reads or writes files run a second time, under sanitizers.
 .PHONY: test
 test: configure
 	cmake --build $(RELEASE) --parallel $(JOBS)
+	$(call CONFIGURE,sanitize)
+	cmake --build $(SANITIZE) --parallel $(JOBS) --target lumigrove_input_tests
+	$(call CTEST,$(SANITIZE)) --label-regex lumigrove_input_tests
 	$(call CTEST,$(RELEASE))
 
 .PHONY: bench
@@ -51,8 +56,8 @@ bench: configure
 .PHONY: sanitize
 sanitize: dependencies
 	$(call CONFIGURE,sanitize)
-	cmake --build build/sanitize --parallel $(JOBS)
-	$(call CTEST,build/sanitize)
+	cmake --build $(SANITIZE) --parallel $(JOBS)
+	$(call CTEST,$(SANITIZE))
 
 .PHONY: format
 format:

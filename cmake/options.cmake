@@ -6,6 +6,7 @@ target_compile_options(lumigrove_options INTERFACE
   -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
   $<$<BOOL:${LUMIGROVE_WERROR}>:-Werror>)
 if(LUMIGROVE_SANITIZE)
-  target_compile_options(lumigrove_options INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+  target_compile_options(lumigrove_options INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+                         -Wno-maybe-uninitialized)  # false alarms inside std::regex once it is instrumented
   target_link_options(lumigrove_options INTERFACE -fsanitize=address,undefined)
 endif()
