@@ -60,9 +60,10 @@ struct SurfaceBatch {
   // One light sample at every surface: choice, point, shading, shadow ray; nothing is traced.
   void sample() {
     const DirectLighting direct = make_direct_lighting(*world, settings, 0);
-    launch(static_cast<int>(surfaces.size()),
+    launch(walk_batches(static_cast<int>(surfaces.size())),
            DirectLightKernel{direct.sampler, direct.rng, kDimLight, 1.0f, false, surfaces, pixels, shadow,
-                             contribution});
+                             contribution},
+           4);
   }
 };
 
@@ -78,7 +79,7 @@ Result build_tree_1m(const Options& options) {
   std::vector<KeyIndex> pairs;
   const auto less = [](KeyIndex a, KeyIndex b) { return a.key < b.key; };
   const PairTimes times = time_in_turns(
-      options.runs, [&] { world->tree.build(lights, settings.direct.width, false); },
+      options.runs, [&] { world->tree.build(lights, {settings.direct.width, settings.direct.cones, false}); },
       [&] { tbb::parallel_sort(pairs.begin(), pairs.end(), less); }, [&] { pairs = input; });
   return {times.ratio,
           {{"build_ms", times.a_ms},

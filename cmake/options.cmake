@@ -3,7 +3,7 @@ add_library(lumigrove_options INTERFACE)
 target_compile_options(lumigrove_options INTERFACE
   -march=${LUMIGROVE_ARCH}
   -fno-math-errno -fno-trapping-math      # let loops over children vectorise; NaN and infinity keep their meaning
-  -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
+  -Wno-psabi -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
   $<$<BOOL:${LUMIGROVE_WERROR}>:-Werror>)
 if(LUMIGROVE_SANITIZE)
   target_compile_options(lumigrove_options INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer

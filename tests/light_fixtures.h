@@ -135,15 +135,18 @@ inline Scene far_clusters_under_a_sky(std::uint32_t seed = 4) {
   return scene;
 }
 
+// The default tree, which can also be asked for probabilities.
+inline constexpr LightTree::Options kTree{16, true, true};
+
 // Light set and samplers over a scene that it owns.
 class LightWorld {
  public:
-  explicit LightWorld(Scene scene, int tree_width = 8, Settings settings = {})
+  explicit LightWorld(Scene scene, LightTree::Options tree = kTree, Settings settings = {})
       : scene_(std::make_unique<Scene>(std::move(scene))), state_(evaluate(*scene_, 0)), arrays_(*scene_) {
     arrays_.set_state(state_);
     lights_ = std::make_unique<LightSet>(*scene_, arrays_);
     lights_->gather(arrays_, state_, settings);
-    tree_.build(lights_->view(), tree_width, true);
+    tree_.build(lights_->view(), tree);
     std::vector<float> flux;
     for (std::uint32_t i = 0; i < lights_->view().emitters.size(); ++i)
       flux.push_back(emitter_flux(lights_->view(), i));

@@ -29,7 +29,7 @@ TEST(LightSet, LightScaleMultipliesEveryKind) {
   scene.environment.radiance = vec3(1);
   Settings settings;
   settings.light_scale = 3;
-  const LightWorld plain(scene), scaled(scene, 8, settings);
+  const LightWorld plain(scene), scaled(scene, kTree, settings);
   EXPECT_NEAR(scaled.lights().local_flux, 3 * plain.lights().local_flux, 1e-4);
   EXPECT_EQ(scaled.lights().environment.radiance, vec3(3));
 }
@@ -61,7 +61,7 @@ TEST(LightSet, RangeCutsOffUnlessIgnored) {
   add_light(scene, light, vec3(0));
   Settings ignore;
   ignore.ignore_range = true;
-  const LightWorld limited(scene), unlimited(scene, 8, ignore);
+  const LightWorld limited(scene), unlimited(scene, kTree, ignore);
   EXPECT_EQ(punctual_point(limited.lights(), limited.lights().emitters[0], vec3(2.1f, 0, 0)).incident,
             vec3(0));
   EXPECT_NEAR(punctual_point(unlimited.lights(), unlimited.lights().emitters[0], vec3(2, 0, 0)).incident.x,

@@ -13,32 +13,46 @@ namespace {
 
 using namespace lumigrove::testing;
 
-constexpr int kWidths[] = {2, 4, 8, 16};
+constexpr LightTree::Options kTrees[] = {{2, false, true},  {4, false, true}, {8, false, true}, {16, false, true},
+                                         {2, true, true},   {4, true, true},  {8, true, true},  {16, true, true}};
 
-TEST(LightTree, BoxesHoldTheirLeavesAndIntensitiesAdd) {
-  for (const int width : kWidths) {
-    const LightWorld world(uneven_mix(), width);
-    const LightTreeView tree = world.tree().view();
-    const LightView lights = world.lights();
-    const std::size_t w = static_cast<std::size_t>(width);
-    std::uint32_t span = 1;  // leaves below a child
-    for (int level = tree.levels - 1; level >= 0; --level, span *= static_cast<std::uint32_t>(width)) {
-      for (std::uint32_t leaf = 0; leaf < tree.count; leaf += span) {
-        const std::uint32_t child = leaf / span;
-        const float* node = tree.nodes + (tree.level_first[level] + child / w) * kNodeRows * w;
-        const auto row = [&](int r) { return node[static_cast<std::size_t>(r) * w + child % w]; };
-        double sum = 0;
-        for (std::uint32_t k = leaf; k < std::min(tree.count, leaf + span); ++k) {
-          const Box3 box = emitter_bounds(lights.emitters[tree.leaf_emitters[k]]);
-          const vec3 centre(row(kCentreX), row(kCentreY), row(kCentreZ)), half(row(kHalfX), row(kHalfY), row(kHalfZ));
-          EXPECT_TRUE(glm::all(glm::lessThanEqual(centre - half, box.lo)));
-          EXPECT_TRUE(glm::all(glm::greaterThanEqual(centre + half, box.hi)));
-          sum += emitter_intensity(lights, tree.leaf_emitters[k]);
-        }
-        EXPECT_NEAR(row(kIntensity), sum, 1e-4 * sum);
+std::string name_of(const LightTree::Options& tree) {
+  return "width " + std::to_string(tree.width) + (tree.cones ? " with cones" : "");
+}
+
+template <int W>
+void expect_nodes_hold_their_leaves(const LightWorld& world) {
+  const LightTreeView tree = world.tree().view();
+  const LightView lights = world.lights();
+  std::uint32_t span = 1;  // leaves below a child
+  for (int level = tree.levels - 1; level >= 0; --level, span *= W) {
+    for (std::uint32_t leaf = 0; leaf < tree.count; leaf += span) {
+      const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
+      const std::uint32_t c = leaf / span % W;
+      const vec3 centre(node.centre_x[c], node.centre_y[c], node.centre_z[c]);
+      const vec3 half(node.half_x[c], node.half_y[c], node.half_z[c]);
+      const vec3 axis = vec3(node.axis_x[c], node.axis_y[c], node.axis_z[c]) / kConeAxis;
+      const float radius = 2 * static_cast<float>(node.radius[c]) / kConeRadius;
+      double sum = 0;
+      for (std::uint32_t k = leaf; k < std::min(tree.count, leaf + span); ++k) {
+        const Emitter& emitter = lights.emitters[tree.leaf_emitters[k]];
+        const Box3 box = emitter_bounds(emitter);
+        EXPECT_TRUE(glm::all(glm::lessThanEqual(centre - half, box.lo)));
+        EXPECT_TRUE(glm::all(glm::greaterThanEqual(centre + half, box.hi)));
+        const NormalCone cone = emission_cone(lights, emitter);
+        EXPECT_LE(std::min(2.0f, glm::length(cone.axis - axis) + cone.radius), radius);
+        sum += emitter_intensity(lights, tree.leaf_emitters[k]) / lights.local_flux;
       }
+      EXPECT_NEAR(node.intensity[c], sum, 1e-4 * sum);
     }
   }
+}
+
+TEST(LightTree, BoxesAndConesHoldTheirLeavesAndIntensitiesAdd) {
+  expect_nodes_hold_their_leaves<2>(LightWorld(uneven_mix(), {2, true, true}));
+  expect_nodes_hold_their_leaves<4>(LightWorld(triangle_cloud(200, 0.3f), {4, true, true}));
+  expect_nodes_hold_their_leaves<8>(LightWorld(uneven_mix(), {8, true, true}));
+  expect_nodes_hold_their_leaves<16>(LightWorld(punctual_cloud(120), {16, true, true}));
 }
 
 TEST(LightTree, LeavesEveryEmitterWithFluxExactlyOnce) {
@@ -54,14 +68,14 @@ TEST(LightTree, LeavesEveryEmitterWithFluxExactlyOnce) {
 
 TEST(LightTree, ProbabilitiesSumToOneOrToNothingOnADeadBranch) {
   for (const NamedScene& named : light_scenes()) {
-    for (const int width : kWidths) {
-      const LightWorld world(named.scene, width);
+    for (const LightTree::Options& tree_options : kTrees) {
+      const LightWorld world(named.scene, tree_options);
       for (const Surface& s : shading_points(60)) {
         double sum = 0;
         for (std::uint32_t e = 0; e < world.lights().emitters.size(); ++e)
           sum += pdf_tree(world.tree().view(), s.position, s.normal, e);
         // A dead branch below a live one loses its share, so the sum may fall short, never exceed.
-        EXPECT_LE(sum, 1 + 1e-4) << named.name << ", width " << width;
+        EXPECT_LE(sum, 1 + 1e-4) << named.name << ", " << name_of(tree_options);
       }
     }
   }
@@ -69,15 +83,15 @@ TEST(LightTree, ProbabilitiesSumToOneOrToNothingOnADeadBranch) {
 
 TEST(LightTree, WalkReportsThePdfBitForBit) {
   for (const NamedScene& named : light_scenes()) {
-    for (const int width : kWidths) {
-      const LightWorld world(named.scene, width);
+    for (const LightTree::Options& tree_options : kTrees) {
+      const LightWorld world(named.scene, tree_options);
       Stream random(77);
       for (const Surface& s : shading_points(200)) {
         const vec4 u = random.next();
         const TreeSample sample = sample_tree(world.tree().view(), s.position, s.normal, vec2(u.x, u.y));
         if (sample.emitter == kNoEmitter) continue;
         EXPECT_EQ(sample.pdf, pdf_tree(world.tree().view(), s.position, s.normal, sample.emitter))
-            << named.name;
+            << named.name << ", " << name_of(tree_options);
       }
     }
   }
@@ -86,8 +100,8 @@ TEST(LightTree, WalkReportsThePdfBitForBit) {
 TEST(LightTree, FrequenciesFollowThePdf) {
   constexpr int kDraws = 40000;
   for (const NamedScene& named : light_scenes()) {
-    for (const int width : kWidths) {
-      const LightWorld world(named.scene, width);
+    for (const LightTree::Options& tree_options : kTrees) {
+      const LightWorld world(named.scene, tree_options);
       const LightTreeView tree = world.tree().view();
       const std::size_t n = world.lights().emitters.size();
       Stream random(5);
@@ -103,8 +117,8 @@ TEST(LightTree, FrequenciesFollowThePdf) {
           total += expected[e] = kDraws * static_cast<double>(pdf_tree(tree, s.position, s.normal, e));
         expected[n] = kDraws - total;  // dead branches
         if (expected[n] < 1e-3 * kDraws && observed[n] == 0) expected[n] = 0;
-        // 96 tests in all: 1e-5 each keeps false alarms below one in a thousand.
-        EXPECT_GT(chi_square_p_value(observed, expected), 1e-5) << named.name << ", width " << width;
+        // 192 tests in all: 1e-5 each keeps false alarms below one in five hundred.
+        EXPECT_GT(chi_square_p_value(observed, expected), 1e-5) << named.name << ", " << name_of(tree_options);
       }
     }
   }
@@ -114,8 +128,8 @@ TEST(LightTree, FrequenciesFollowThePdf) {
 // angles.
 TEST(LightTree, ContributionImpliesProbability) {
   for (const NamedScene& named : light_scenes()) {
-    for (const int width : kWidths) {
-      const LightWorld world(named.scene, width);
+    for (const LightTree::Options& tree_options : kTrees) {
+      const LightWorld world(named.scene, tree_options);
       const LightSampler sampler = world.sampler(LightChoice::kTree);
       Stream random(8);
       for (const Surface& s : shading_points(300, 12)) {
@@ -141,16 +155,15 @@ TEST(LightTree, PointsOnALightAreSampledSafely) {
 }
 
 TEST(LightTree, OneLightIsAlwaysFoundAndNoLightNever) {
-  for (const int width : kWidths) {
-    const LightWorld one(triangle_cloud(4, 0.1f), width);
+  for (const LightTree::Options& tree_options : kTrees) {
     Scene single;
     add_node(single, {add_mesh(single, add_material(single, vec3(1)),
                                {vec3(0, 1, 0), vec3(1, 1, 0), vec3(0, 1, 1)})});
-    const LightWorld alone(single, width);
+    const LightWorld alone(single, tree_options);
     const TreeSample found = sample_tree(alone.tree().view(), vec3(0), vec3(0, 1, 0), vec2(0.99f, 0));
     EXPECT_EQ(found.emitter, 0u);
     EXPECT_EQ(found.pdf, 1.0f);
-    const LightWorld dark(Scene{}, width);
+    const LightWorld dark(Scene{}, tree_options);
     EXPECT_EQ(sample_tree(dark.tree().view(), vec3(0), vec3(0, 1, 0), vec2(0.5f)).emitter, kNoEmitter);
   }
 }
@@ -159,8 +172,8 @@ TEST(LightTree, CoincidentLightsShareEqually) {
   Scene scene;
   add_node(scene, {add_mesh(scene, add_material(scene, vec3(0)), {vec3(-1), vec3(1), vec3(1, -1, 1)})});
   for (int i = 0; i < 37; ++i) add_light(scene, {}, vec3(0, 2, 0));
-  for (const int width : kWidths) {
-    const LightWorld world(scene, width);
+  for (const LightTree::Options& tree_options : kTrees) {
+    const LightWorld world(scene, tree_options);
     for (std::uint32_t e = 0; e < 37; ++e)
       EXPECT_NEAR(pdf_tree(world.tree().view(), vec3(1, 0, 0), vec3(0, 1, 0), e), 1.0 / 37, 1e-5);
   }
@@ -168,13 +181,12 @@ TEST(LightTree, CoincidentLightsShareEqually) {
 
 TEST(LightTree, SameBitsForAnyThreadCount) {
   const Scene scene = triangle_cloud(20000, 0.01f);
-  std::vector<std::vector<float>> nodes;
+  std::vector<std::vector<std::byte>> nodes;
   for (const std::size_t threads : {1u, 2u, 4u}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     const LightWorld world(scene);
     const LightTreeView tree = world.tree().view();
-    nodes.emplace_back(tree.nodes,
-                       tree.nodes + (world.tree().bytes() - 8 * std::size_t{tree.count}) / sizeof(float));
+    nodes.emplace_back(tree.nodes, tree.nodes + (world.tree().bytes() - 8 * std::size_t{tree.count}));
   }
   EXPECT_EQ(nodes[0], nodes[1]);
   EXPECT_EQ(nodes[0], nodes[2]);
@@ -213,7 +225,7 @@ TEST(LightTree, AMillionLightsStayWithinTheirBytesAndAreReachable) {
 
 TEST(LightTree, OtherWidthsAreRefused) {
   LightTree tree;
-  EXPECT_THROW(tree.build(LightView{}, 3, false), Error);
+  EXPECT_THROW(tree.build(LightView{}, {3, false, false}), Error);
 }
 
 }  // namespace

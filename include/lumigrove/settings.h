@@ -25,7 +25,8 @@ struct DirectSettings {
   Selection selection = Selection::kRoot;
   Hierarchy hierarchy = Hierarchy::kPerfect;  // needed by kRoot
   Weights weights = Weights::kMinMax;
-  int width = 8;                // children a node: 2 (as the paper), 4, 8, 16
+  int width = 16;               // children a node: 2 (as the paper), 4, 8, 16
+  bool cones = true;            // weights bound the emitters' own cosine (the paper's do not)
   int spp = 1;                  // light samples for each camera sample
   bool mis = false;             // combine with BSDF sampling (balance heuristic)
 };

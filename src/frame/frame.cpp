@@ -162,7 +162,7 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   stats.structures.push_back(
       {"light set", world.lights.gather_ms(), world.lights.bytes(), lights.emitters.size()});
   if (settings.direct.selection == Selection::kRoot) {
-    world.tree.build(lights, settings.direct.width, settings.direct.mis);
+    world.tree.build(lights, {settings.direct.width, settings.direct.cones, settings.direct.mis});
     stats.structures.push_back(
         {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
   }

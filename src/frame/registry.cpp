@@ -232,6 +232,9 @@ std::vector<Setting> direct_rows() {
           "direct.width", [](auto& s) -> auto& { return s.direct.width; },
           vector<pair<string, int>>{{"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}},
           "Children of a hierarchy node"),
+      flag(
+          "direct.cones", [](auto& s) -> auto& { return s.direct.cones; },
+          "Weights also bound the cosine at the emitters, so that those facing away are left out"),
       integer(
           "direct.spp", [](auto& s) -> auto& { return s.direct.spp; }, {1, 4096}, "samples",
           "Light samples for each camera sample"),

@@ -47,6 +47,26 @@ LUMI_HD inline Box3 emitter_bounds(const Emitter& e) {
   return {glm::min(e.p0, glm::min(p1, p2)), glm::max(e.p0, glm::max(p1, p2))};
 }
 
+// Directions n' with |n' - axis| <= radius; radius 2 holds all directions.
+struct NormalCone {
+  vec3 axis;
+  float radius;
+};
+
+// Light leaves an emitter only towards the side of these normals: a point x is lit only if n' (x - y) > 0 for one of
+// them and a point y of the emitter.
+LUMI_HD inline NormalCone emission_cone(const LightView& lights, const Emitter& e) {
+  constexpr NormalCone kAll{vec3(0), 2};
+  if (e.punctual()) {
+    const bool forwards = lights.punctual[e.source & ~Emitter::kPunctual].spot && e.e2.x >= 0;
+    return forwards ? NormalCone{e.e1, 0} : kAll;
+  }
+  if (lights.instances[e.source].double_sided) return kAll;
+  const vec3 n = glm::cross(e.e1, e.e2);
+  const float squared = length_squared(n);
+  return squared > 1e-37f && is_finite(squared) ? NormalCone{n * (1 / glm::sqrt(squared)), 0} : kAll;
+}
+
 // Index of the emitter that a hit triangle is, EmissiveInstance::kNoEmitters if none.
 LUMI_HD inline std::uint32_t emitter_of_triangle(const LightView& lights, std::uint32_t instance,
                                                  std::uint32_t triangle) {

@@ -15,6 +15,7 @@
 #include "lights/light_set.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/light_tree/light_tree_build_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
 #include "scene/bsdf.h"
@@ -87,8 +88,8 @@ template void cuda::launch<CameraKernel>(int, const CameraKernel&, cudaStream_t)
 template void cuda::launch<SurfaceKernel>(int, const SurfaceKernel&, cudaStream_t);
 template void cuda::launch<EmissionKernel>(int, const EmissionKernel&, cudaStream_t);
 template void cuda::launch<MortonKernel>(int, const MortonKernel&, cudaStream_t);
-template void cuda::launch<LeafNodeKernel<8>>(int, const LeafNodeKernel<8>&, cudaStream_t);
-template void cuda::launch<InnerNodeKernel<8>>(int, const InnerNodeKernel<8>&, cudaStream_t);
+template void cuda::launch<LeafNodeKernel<16>>(int, const LeafNodeKernel<16>&, cudaStream_t);
+template void cuda::launch<InnerNodeKernel<16>>(int, const InnerNodeKernel<16>&, cudaStream_t);
 template void cuda::launch<DirectLightKernel>(int, const DirectLightKernel&, cudaStream_t);
 template void cuda::launch<AddUnoccludedKernel>(int, const AddUnoccludedKernel&, cudaStream_t);
 template void cuda::launch<PathStartKernel>(int, const PathStartKernel&, cudaStream_t);

@@ -17,8 +17,10 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
                     std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   const int count = static_cast<int>(surfaces.size());
   auto start = std::chrono::steady_clock::now();
-  launch(count, DirectLightKernel{sampler, lighting.rng, dimension, 1.0f / static_cast<float>(lighting.spp),
-                                  lighting.mis, surfaces, pixels, buffers.shadow, buffers.contribution});
+  launch(walk_batches(count),
+         DirectLightKernel{sampler, lighting.rng, dimension, 1.0f / static_cast<float>(lighting.spp), lighting.mis,
+                           surfaces, pixels, buffers.shadow, buffers.contribution},
+         4);
   buffers.select_ms += milliseconds_since(start);
 
   start = std::chrono::steady_clock::now();

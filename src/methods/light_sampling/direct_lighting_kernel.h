@@ -11,7 +11,8 @@
 namespace lumigrove {
 
 // surfaces[i] -> shadow[i], contribution[i] (radiance towards wo if unoccluded). Rays that carry nothing are
-// marked untraced. Surfaces take their random numbers from `dimension`.
+// marked untraced. Surfaces take their random numbers from `dimension`. One call does kWalkBatch surfaces, so that
+// their walks down the tree go together.
 struct DirectLightKernel {
   LightSampler sampler;
   Rng rng;
@@ -23,16 +24,67 @@ struct DirectLightKernel {
   std::span<Ray> shadow;
   std::span<vec3> contribution;
 
-  LUMI_HD void operator()(int index) const {
-    const std::size_t i = static_cast<std::size_t>(index);
+  LUMI_HD void operator()(int batch) const {
+    const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
+    const int count = static_cast<int>(glm::min<std::size_t>(kWalkBatch, surfaces.size() - first));
+    if (sampler.choice == LightChoice::kTree) {
+      light_by_walks(first, count);
+      return;
+    }
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k);
+      if (lights_up(i)) write(i, sample_light(sampler, surfaces[i], random_numbers(i)));
+    }
+  }
+
+ private:
+  LUMI_HD vec4 random_numbers(std::size_t i) const {
+    return Rng{rng.seed, rng.frame, pixels[i]}.uniform4(dimension);
+  }
+
+  // Marks the outputs as carrying nothing; is there a surface to light?
+  LUMI_HD bool lights_up(std::size_t i) const {
     shadow[i].tmax = -1;
     contribution[i] = vec3(0);
-    const Surface& surface = surfaces[i];
-    if (surface.instance == kNone) return;
-    Rng pixel_rng = rng;
-    pixel_rng.pixel = pixels[i];
-    const LightSample sample = sample_light(sampler, surface, pixel_rng.uniform4(dimension));
+    return surfaces[i].instance != kNone;
+  }
+
+  LUMI_HD void light_by_walks(std::size_t first, int count) const {
+    WalkPoint points[kWalkBatch] = {};
+    ChosenGroup groups[kWalkBatch];
+    vec2 u_point[kWalkBatch];
+    std::size_t index[kWalkBatch];
+    TreeSample chosen[kWalkBatch];
+    int walks = 0;
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k);
+      if (!lights_up(i)) continue;
+      const Surface& surface = surfaces[i];
+      const vec4 u = random_numbers(i);
+      const ChosenGroup group = choose_group(sampler, surface, u.x);
+      if (group.group != LightGroup::kLocal) {
+        write(i, light_in_group(sampler, surface, group, {}, vec2(u.y, u.z)));
+        continue;
+      }
+      points[walks] = {surface.position, group.r, surface.normal, u.w};
+      groups[walks] = group;
+      u_point[walks] = vec2(u.y, u.z);
+      index[walks++] = i;
+    }
+    sample_trees(sampler.tree, points, walks, chosen);
+    for (int k = 0; k < walks; ++k) {
+      if (!(chosen[k].pdf > 0)) continue;
+      const Emitter* emitter = &sampler.lights.emitters[chosen[k].emitter];
+      prefetch(emitter);
+      prefetch(&emitter->source);
+    }
+    for (int k = 0; k < walks; ++k)
+      write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], u_point[k]));
+  }
+
+  LUMI_HD void write(std::size_t i, const LightSample& sample) const {
     if (!(max_component(sample.weight) > 0)) return;
+    const Surface& surface = surfaces[i];
     const float cosine = glm::dot(surface.normal, sample.wi);
     if (!(cosine > 0)) return;
     vec3 light = bsdf_eval(surface, sample.wi) * sample.weight * (cosine * scale);
@@ -42,6 +94,9 @@ struct DirectLightKernel {
     shadow[i] = shadow_ray(surface, sample, sampler.lights.diagonal);
   }
 };
+
+// Calls of a DirectLightKernel for so many surfaces.
+LUMI_HD inline int walk_batches(int surfaces) { return (surfaces + kWalkBatch - 1) / kWalkBatch; }
 
 struct AddUnoccludedKernel {
   std::span<const vec3> contribution;

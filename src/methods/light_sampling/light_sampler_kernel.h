@@ -69,18 +69,29 @@ LUMI_HD inline GroupProbabilities group_probabilities(const LightSampler& sample
   return {share(local_flux), share(directional_flux), share(environment_flux)};
 }
 
-LUMI_HD inline TreeSample sample_tree(const LightTreeView& tree, vec3 x, vec3 n, vec2 u) {
-  if (tree.count == 0) return {};
-  switch (tree.width) {
+// Walks for at most kWalkBatch points.
+LUMI_HD inline void sample_trees(const LightTreeView& tree, const WalkPoint* points, int count,
+                                 TreeSample* samples) {
+  switch (tree.count > 0 ? tree.width : 0) {
+    case 0:
+      for (int i = 0; i < count; ++i) samples[i] = {};
+      return;
     case 2:
-      return sample_light_tree<2>(tree, x, n, u);
+      return sample_light_tree<2>(tree, points, count, samples);
     case 4:
-      return sample_light_tree<4>(tree, x, n, u);
+      return sample_light_tree<4>(tree, points, count, samples);
     case 8:
-      return sample_light_tree<8>(tree, x, n, u);
+      return sample_light_tree<8>(tree, points, count, samples);
     default:
-      return sample_light_tree<16>(tree, x, n, u);
+      return sample_light_tree<16>(tree, points, count, samples);
   }
+}
+
+LUMI_HD inline TreeSample sample_tree(const LightTreeView& tree, vec3 x, vec3 n, vec2 u) {
+  const WalkPoint point{x, u.x, n, u.y};
+  TreeSample sample;
+  sample_trees(tree, &point, 1, &sample);
+  return sample;
 }
 
 LUMI_HD inline float pdf_tree(const LightTreeView& tree, vec3 x, vec3 n, std::uint32_t emitter) {
@@ -189,38 +200,72 @@ LUMI_HD inline std::uint32_t light_count(const LightView& lights) {
          (lights.environment.present() ? 1u : 0u);
 }
 
+enum class LightGroup : std::uint8_t { kDark, kLocal, kDirectional, kEnvironment };
+
+struct ChosenGroup {
+  LightGroup group = LightGroup::kDark;
+  float probability = 0;
+  float r = 0;  // uniform in [0,1) for the choice within the group
+};
+
+LUMI_HD inline ChosenGroup choose_group(const LightSampler& sampler, const Surface& surface, float r) {
+  const GroupProbabilities p = group_probabilities(sampler, surface);
+  const auto choose = [&](LightGroup group, float probability) {
+    return ChosenGroup{group, probability, glm::min(r / probability, 0x1.fffffep-1f)};
+  };
+  if (r < p.local) return choose(LightGroup::kLocal, p.local);
+  r -= p.local;
+  if (r < p.directional) return choose(LightGroup::kDirectional, p.directional);
+  r -= p.directional;
+  if (p.environment > 0) return choose(LightGroup::kEnvironment, p.environment);
+  return {};
+}
+
+// Among the directional lights in front of the surface, by irradiance times cosine.
+LUMI_HD inline LightSample sample_directional(const LightSampler& sampler, const Surface& surface,
+                                              const ChosenGroup& group) {
+  const auto weight_of = [&](const DirectionalView& light) {
+    return luminance(light.irradiance) * glm::max(0.0f, -glm::dot(light.direction, surface.normal));
+  };
+  float total = 0;
+  for (const DirectionalView& light : sampler.lights.directional) total += weight_of(light);
+  float rest = group.r * total;
+  LightSample sample;
+  for (const DirectionalView& light : sampler.lights.directional) {
+    const float weight = weight_of(light);
+    if (!(weight > 0)) continue;
+    sample = directional_sample(light, group.probability * weight / total);
+    if (rest < weight) break;
+    rest -= weight;
+  }
+  return sample;
+}
+
+// The light of a group. `chosen` is choose_emitter's answer for group.r, used by local lights only.
+LUMI_HD inline LightSample light_in_group(const LightSampler& sampler, const Surface& surface,
+                                          const ChosenGroup& group, TreeSample chosen, vec2 u_point) {
+  switch (group.group) {
+    case LightGroup::kLocal:
+      chosen.pdf *= group.probability;
+      return local_sample(sampler, surface, chosen, u_point);
+    case LightGroup::kDirectional:
+      return sample_directional(sampler, surface, group);
+    case LightGroup::kEnvironment:
+      return environment_sample(sampler, surface, group.probability, u_point);
+    case LightGroup::kDark:
+      break;
+  }
+  return {};
+}
+
 // Draws a light and a point on it. u.x: group and light, u.y and u.z: point, u.w: light (second number).
 LUMI_HD inline LightSample sample_light(const LightSampler& sampler, const Surface& surface, vec4 u) {
   const vec2 u_point(u.y, u.z);
   if (sampler.choice == LightChoice::kOne) return one_sample(sampler, surface, u_point);
-  const GroupProbabilities group = group_probabilities(sampler, surface);
-  float r = u.x;
-  if (r < group.local) {
-    r = glm::min(r / group.local, 0x1.fffffep-1f);
-    TreeSample chosen = choose_emitter(sampler, surface, vec2(r, u.w));
-    chosen.pdf *= group.local;
-    return local_sample(sampler, surface, chosen, u_point);
-  }
-  r -= group.local;
-  if (r < group.directional) {
-    // Among those in front of the surface, by irradiance times cosine.
-    float total = 0;
-    for (const DirectionalView& light : sampler.lights.directional)
-      total += luminance(light.irradiance) * glm::max(0.0f, -glm::dot(light.direction, surface.normal));
-    float rest = r / group.directional * total;
-    LightSample sample;
-    for (const DirectionalView& light : sampler.lights.directional) {
-      const float weight =
-          luminance(light.irradiance) * glm::max(0.0f, -glm::dot(light.direction, surface.normal));
-      if (!(weight > 0)) continue;
-      sample = directional_sample(light, group.directional * weight / total);
-      if (rest < weight) break;
-      rest -= weight;
-    }
-    return sample;
-  }
-  if (group.environment > 0) return environment_sample(sampler, surface, group.environment, u_point);
-  return {};
+  const ChosenGroup group = choose_group(sampler, surface, u.x);
+  TreeSample chosen;
+  if (group.group == LightGroup::kLocal) chosen = choose_emitter(sampler, surface, vec2(group.r, u.w));
+  return light_in_group(sampler, surface, group, chosen, u_point);
 }
 
 // Density per solid angle with which sample_light finds point `y` of `emitter` from `surface`.

@@ -6,16 +6,17 @@
 #include "device/device.h"
 #include "device/reduce.h"
 #include "lumigrove/error.h"
+#include "methods/light_tree/light_tree_build_kernel.h"
 
 namespace lumigrove {
 
-void LightTree::build(const LightView& lights, int width, bool keep_leaves) {
+void LightTree::build(const LightView& lights, const Options& options) {
   const auto start = std::chrono::steady_clock::now();
   const int emitters = static_cast<int>(lights.emitters.size());
   view_ = {};
-  view_.width = width;
+  view_.width = options.width;
   // Not below the smallest distance whose square a float resolves against the scene.
-  view_.inside2 = 1e-14f * lights.diagonal * lights.diagonal;
+  view_.inside2 = std::max(1e-14f * lights.diagonal * lights.diagonal, 1e-30f);
 
   const Box3 bounds = reduce(
       emitters, Box3{}, [&](int i) { return emitter_bounds(lights.emitters[static_cast<std::size_t>(i)]); },
@@ -29,8 +30,8 @@ void LightTree::build(const LightView& lights, int width, bool keep_leaves) {
 
   leaf_emitters_.resize(view_.count);
   emitter_leaves_.clear();
-  if (keep_leaves) emitter_leaves_.assign(static_cast<std::size_t>(emitters), kNoEmitter);
-  switch (width) {
+  if (options.keep_leaves) emitter_leaves_.assign(static_cast<std::size_t>(emitters), kNoEmitter);
+  switch (options.width) {
     case 2:
       build_levels<2>(lights);
       break;
@@ -44,8 +45,9 @@ void LightTree::build(const LightView& lights, int width, bool keep_leaves) {
       build_levels<16>(lights);
       break;
     default:
-      throw Error("a light tree has 2, 4, 8 or 16 children a node, not " + std::to_string(width));
+      throw Error("a light tree has 2, 4, 8 or 16 children a node, not " + std::to_string(options.width));
   }
+  if (!options.cones) view_.first_cones = view_.levels;
   build_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
@@ -60,23 +62,47 @@ void LightTree::build_levels(const LightView& lights) {
     view_.level_first[level] = total;
     total += counts[static_cast<std::size_t>(view_.levels - 1 - level)];
   }
-  constexpr std::size_t kNodeFloats = static_cast<std::size_t>(kNodeRows) * W;
-  nodes_.resize(total * kNodeFloats);
-  const auto level_nodes = [&](int level) { return nodes_.data() + view_.level_first[level] * kNodeFloats; };
+  nodes_.resize(total * sizeof(LightNode<W>));
+  auto* const nodes = reinterpret_cast<LightNode<W>*>(nodes_.data());
 
+  const float inverse_flux = lights.local_flux > 0 ? 1 / std::min(lights.local_flux, 1e37f) : 0;
   for (int level = view_.levels - 1; level >= 0; --level) {
     const std::uint32_t count = counts[static_cast<std::size_t>(view_.levels - 1 - level)];
+    LightNode<W>* const here = nodes + view_.level_first[level];
     if (level == view_.levels - 1) {
       launch(static_cast<int>(count),
-             LeafNodeKernel<W>{lights, keys_, view_.count, level_nodes(level), leaf_emitters_.data(),
+             LeafNodeKernel<W>{lights, keys_, view_.count, inverse_flux, here, leaf_emitters_.data(),
                                emitter_leaves_.empty() ? nullptr : emitter_leaves_.data()},
              1024 / W);
     } else {
       const std::uint32_t below = counts[static_cast<std::size_t>(view_.levels - 2 - level)];
-      launch(static_cast<int>(count), InnerNodeKernel<W>{level_nodes(level + 1), below, level_nodes(level)},
+      launch(static_cast<int>(count), InnerNodeKernel<W>{nodes + view_.level_first[level + 1], below, here},
              4096 / W);
     }
   }
+  view_.first_cones = find_first_cones<W>();
+}
+
+// The cones of upper levels hold nearly all directions: they would only cost time. Looks at small levels only, so
+// that the search does not show beside the build.
+template <int W>
+int LightTree::find_first_cones() const {
+  constexpr std::uint32_t kSmallLevel = 512;
+  const auto* nodes = reinterpret_cast<const LightNode<W>*>(nodes_.data());
+  for (int level = 0; level + 1 < view_.levels; ++level) {
+    const std::uint32_t first = view_.level_first[level], end = view_.level_first[level + 1];
+    if (end - first > kSmallLevel) return level;
+    float sum = 0, intensity = 0;
+    for (std::uint32_t i = first; i < end; ++i) {
+      for (int c = 0; c < W; ++c) {
+        sum += nodes[i].intensity[c] * static_cast<float>(nodes[i].radius[c]) * (2 / kConeRadius);
+        intensity += nodes[i].intensity[c];
+      }
+    }
+    constexpr float kUseful = 1.2f;  // |n' - axis| of normals 74 degrees away
+    if (sum < kUseful * intensity) return level;
+  }
+  return std::max(0, view_.levels - 1);
 }
 
 LightTreeView LightTree::view() const {
@@ -88,7 +114,7 @@ LightTreeView LightTree::view() const {
 }
 
 std::size_t LightTree::bytes() const {
-  return nodes_.size() * sizeof(float) +
+  return nodes_.size() +
          (leaf_emitters_.size() + emitter_leaves_.size()) * sizeof(std::uint32_t);
 }
 

@@ -3,6 +3,7 @@
 
 #include <tbb/cache_aligned_allocator.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -14,9 +15,13 @@ namespace lumigrove {
 
 class LightTree {
  public:
-  // `width`: children a node, one of 2, 4, 8, 16 (Error otherwise). `keep_leaves`: also store where each
-  // emitter's leaf is, which pdf_light_tree needs (4 bytes an emitter). Buffers are reused by the next build.
-  void build(const LightView& lights, int width, bool keep_leaves);
+  struct Options {
+    int width = 16;            // children a node: 2, 4, 8 or 16 (Error otherwise)
+    bool cones = true;         // weights bound the emitters' own cosine
+    bool keep_leaves = false;  // also store each emitter's leaf, which pdf_light_tree needs: 4 bytes an emitter
+  };
+  // Buffers are reused by the next build.
+  void build(const LightView& lights, const Options& options);
 
   LightTreeView view() const;
   std::size_t bytes() const;  // nodes and tables; not the buffers of the build
@@ -25,9 +30,11 @@ class LightTree {
  private:
   template <int W>
   void build_levels(const LightView& lights);
+  template <int W>
+  int find_first_cones() const;
 
   LightTreeView view_;
-  std::vector<float, tbb::cache_aligned_allocator<float>> nodes_;
+  std::vector<std::byte, tbb::cache_aligned_allocator<std::byte>> nodes_;
   std::vector<std::uint32_t> leaf_emitters_, emitter_leaves_;
   std::vector<KeyIndex> keys_, scratch_;
   double build_ms_ = 0;

@@ -1,164 +1,214 @@
-// Method      Picks one emitter out of very many with probability close to its share of the light at a point,
-// by one
-//             walk down a perfect tree over the emitters in Morton order.
-// Paper       D. Lin, C. Yuksel, "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020): 3.1
-// and 3.2; cosine
-//             bound and special cases as in the authors' code (distance 0, dead branches).
-// Symbols     I_j -> intensity -> Y of the peak radiant intensity under child j, W/sr
-//             F_j -> cosine_bound -> bound of cos at the receiver over the child's box, no material
-//             d_j^min, d_j^max -> near2, far2 -> squared distance from x to the box's nearest / farthest
-//             point, m^2 p_j -> probability -> of stepping to child j, given its parent
-// Equations   (1) w_j^min, w_j^max and (2) their normalisation, averaged -> child_probabilities
-// Departures  Nodes have W children (2 is the paper's tree; 4, 8 and 16 weigh their children in one pass over
-// SoA
-//             arrays, with eqs. 1-2 normalised over W instead of 2). Bogus leaves are not stored, except to
-//             fill the last node of a level: their intensity is 0. Emitters of no flux are sorted last and
-//             left out. Points closer than 1e-7 D to a box count as inside it. The horizon test has a
-//             relative margin of 1e-6, so that rounding never makes a light at the horizon impossible.
+// Method      Picks one emitter out of very many with probability close to its share of the light at a point, by
+//             one walk down a perfect tree over the emitters in Morton order.
+// Paper       D. Lin, C. Yuksel, "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020): 3.1 and 3.2;
+//             cosine bound and special cases as in the authors' code (distance 0, dead branches).
+// Symbols     I_j -> intensity -> Y of the peak radiant intensity under child j, as a share of all local flux
+//             F_j -> cosine -> bound of cos at the receiver over the child's box, no material
+//             d_j^min, d_j^max -> near2, far2 -> squared distance from x to the box's nearest / farthest point, m^2
+//             p_j -> weight / total -> probability of stepping to child j, given its parent
+// Equations   (1) w_j^min, w_j^max and (2) their normalisation, averaged -> weigh_children
+// Departures  Nodes have W children (2 is the paper's tree; 4, 8 and 16 weigh their children in one pass over SoA
+//             rows, with eqs. 1-2 normalised over W instead of 2). Bogus leaves are not stored, except to fill the
+//             last node of a level: their intensity is 0. Emitters of no flux are sorted last and left out. Points
+//             closer than 1e-7 D to a box count as inside it. The horizon test has a relative margin of 1e-6, so
+//             that rounding never makes a light at the horizon impossible. F_j is the highest corner's height over
+//             the nearest distance.
+//             With `cones`, weights also have a bound of the emitters' own cosine, which the paper leaves out: half
+//             of all samples of closed meshes would otherwise fall on emitters that face away.
 // Estimator   unbiased: every emitter that can contribute at x has positive probability, and the probability
-// returned
-//             is exactly the product of the steps taken.
-// In -> Out   point x, unit normal n, two uniform numbers -> emitter and probability; kNone and 0 on a dead
-// branch
-//             (all boxes below the horizon).
-// Oracle      tests/light_tree_test.cpp: enumeration of pdf_light_tree over all emitters, chi-square of the
-// walk
-//             against it, mean against the exhaustive sum, LightTree::verify for the build.
+//             returned is exactly the product of the steps taken.
+// In -> Out   point x, unit normal n, two uniform numbers -> emitter and probability; kNoEmitter and 0 on a dead
+//             branch (all boxes below the horizon or facing away).
+// Oracle      tests/light_tree_test.cpp: enumeration of pdf_light_tree over all emitters, chi-square of the walk
+//             against it, mean against the exhaustive sum, boxes and cones against their leaves.
 #pragma once
 
-#include <span>
+#include <cmath>
+#include <cstddef>
 
-#include "base/morton.h"
+#include "base/lanes.h"
 #include "base/vec.h"
-#include "device/sort.h"
-#include "lights/emitter.h"
-#include "lights/light_set.h"
 
 namespace lumigrove {
 
 inline constexpr int kMaxTreeLevels = 32;
 inline constexpr std::uint32_t kNoEmitter = 0xffffffffu;
 
-// Node k of level l holds, for children W*k..W*k+W-1 of level l+1, seven rows of W floats.
-// Boxes as centre and half extent (rounded outwards): distance and horizon then need a third fewer operations.
-enum NodeRow : int { kCentreX, kCentreY, kCentreZ, kHalfX, kHalfY, kHalfZ, kIntensity, kNodeRows };
+// Walks go down together, a level at a time: while one waits for its node or its arithmetic the others go on.
+#if defined(__CUDACC__)
+inline constexpr int kWalkBatch = 1;  // a warp does that by itself
+#else
+inline constexpr int kWalkBatch = 64;  // their nodes fit the first-level cache
+#endif
+
+// W children. Boxes as centre and half extent (rounded outwards): distance and horizon then need a third fewer
+// operations than with corners. The normals n' of a child's emitters lie in a cone |n' - axis| <= radius. 32 bytes a
+// child.
+template <int W>
+struct alignas(W * sizeof(float)) LightNode {
+  float centre_x[W], centre_y[W], centre_z[W];
+  float half_x[W], half_y[W], half_z[W];
+  float intensity[W];
+  std::int8_t axis_x[W], axis_y[W], axis_z[W];  // in units of 1/kConeAxis
+  std::uint8_t radius[W];                       // in units of 2/kConeRadius
+};
+inline constexpr float kConeAxis = 127, kConeRadius = 255;
 
 struct LightTreeView {
-  const float* nodes = nullptr;
+  const std::byte* nodes = nullptr;              // LightNode<width>, level by level from the root
   const std::uint32_t* leaf_emitters = nullptr;  // leaf -> emitter
-  const std::uint32_t* emitter_leaves =
-      nullptr;  // emitter -> leaf, kNoEmitter if it has none; null unless kept
+  const std::uint32_t* emitter_leaves = nullptr;  // emitter -> leaf, kNoEmitter if none; null unless kept
   std::uint32_t level_first[kMaxTreeLevels] = {};  // index of a level's first node, root level first
   int levels = 0;                                  // of nodes; leaves lie below the last
   int width = 0;                                   // W
   std::uint32_t count = 0;                         // leaves
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
+  int first_cones = 0;  // first level whose weights bound the emitters' own cosine; `levels` for none
+
+  // Node k of level l holds children W*k..W*k+W-1 of level l+1.
+  template <int W>
+  LUMI_HD const LightNode<W>* level(int l) const {
+    return reinterpret_cast<const LightNode<W>*>(nodes) + level_first[l];
+  }
 };
 
-// Sum of W values by halves: short dependency chain, same order on every device.
 template <int W>
-LUMI_HD inline float sum_lanes(const float* values) {
-  float partial[W];
-  for (int c = 0; c < W; ++c) partial[c] = values[c];
-  for (int half = W / 2; half > 0; half /= 2)
-    for (int c = 0; c < half; ++c) partial[c] += partial[c + half];
-  return partial[0];
+struct ChildWeights {
+  Lanes<W> weight;
+  Lanes<W> cumulative;  // sum of the weights up to and with this child's
+  float total;          // 0: no child can contribute
+};
+
+// Upper bound of cos at the emitters of every child, times `near`: n' (x - y) over all y in the box and n' in the
+// cone is at most axis (x - c) + |axis| h + radius (|x - c| + |h|), and the last sum at most sqrt(2) |far|.
+// `to_centre` is c - x, `half` is h.
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE Lanes<W> bound_facing(const LightNode<W>& node, const LaneVec3<W>& to_centre,
+                                                 const LaneVec3<W>& half, const Lanes<W>& far) {
+  const LaneVec3<W> axis{load_bytes<W>(node.axis_x), load_bytes<W>(node.axis_y), load_bytes<W>(node.axis_z)};
+  const Lanes<W> scaled = dot<W>(abs_lanes<W>(axis), half) - dot<W>(axis, to_centre);
+  const Lanes<W> slack = load_bytes<W>(node.radius) * (far * (1.41422f * 2 / kConeRadius));
+  return multiply_add<W>(scaled, broadcast<W>(1 / kConeAxis), slack);
 }
 
-// Equations 1 and 2 at once for the W children of a node. Returns false, leaving `probability` undefined, when no
-// child can contribute.
+// Equations 1 and 2 for the W children of a node at once.
 template <int W>
-LUMI_HD inline bool child_probabilities(const float* node, float inside2, vec3 x, vec3 n, float* probability) {
-  const float* centre_x = node + kCentreX * W;
-  const float* centre_y = node + kCentreY * W;
-  const float* centre_z = node + kCentreZ * W;
-  const float* half_x = node + kHalfX * W;
-  const float* half_y = node + kHalfY * W;
-  const float* half_z = node + kHalfZ * W;
-  const float* intensity = node + kIntensity * W;
-  const vec3 abs_n = glm::abs(n);
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
+                                                          vec3 x, vec3 n) {
+  const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), inside = broadcast<W>(inside2);
+  const LaneVec3<W> half{load_lanes<W>(node.half_x), load_lanes<W>(node.half_y), load_lanes<W>(node.half_z)};
+  const LaneVec3<W> to_centre{load_lanes<W>(node.centre_x) - x.x, load_lanes<W>(node.centre_y) - x.y,
+                              load_lanes<W>(node.centre_z) - x.z};
+  const LaneVec3<W> apart = abs_lanes<W>(to_centre);
+  const LaneVec3<W> nearest{max_lanes<W>(apart.x - half.x, zero), max_lanes<W>(apart.y - half.y, zero),
+                            max_lanes<W>(apart.z - half.z, zero)};
+  const LaneVec3<W> farthest{apart.x + half.x, apart.y + half.y, apart.z + half.z};
+  const Lanes<W> near2 = dot<W>(nearest, nearest), far2 = dot<W>(farthest, farthest);
+  const Lanes<W> inverse_near = reciprocal_sqrt<W>(max_lanes<W>(near2, inside));
+  const Lanes<W> inverse_far = reciprocal_sqrt<W>(max_lanes<W>(far2, inside));
+  const Lanes<W> far = far2 * inverse_far;
 
-  alignas(64) float near_weight[W], far_weight[W], inside_weight[W];
-  for (int c = 0; c < W; ++c) {
-    const float dx = centre_x[c] - x.x, dy = centre_y[c] - x.y, dz = centre_z[c] - x.z;
-    const float ax = glm::abs(dx), ay = glm::abs(dy), az = glm::abs(dz);
-    const float px = glm::max(ax - half_x[c], 0.0f), py = glm::max(ay - half_y[c], 0.0f), pz = glm::max(az - half_z[c], 0.0f);
-    const float fx = ax + half_x[c], fy = ay + half_y[c], fz = az + half_z[c];
-    const float near2 = px * px + py * py + pz * pz;
-    const float far2 = fx * fx + fy * fy + fz * fz;
-    // Highest corner of the box above the tangent plane, and height of its nearest point.
-    const float height = n.x * dx + n.y * dy + n.z * dz + abs_n.x * half_x[c] + abs_n.y * half_y[c] + abs_n.z * half_z[c] +
-                         1e-6f * (fx + fy + fz);
-    const float along = n.x * (dx < 0 ? -px : px) + n.y * (dy < 0 ? -py : py) + n.z * (dz < 0 ? -pz : pz);
-    const float tangent2 = glm::max(near2 - along * along, 0.0f);
-    // weight = I cos; one division serves weight / near2 and weight / far2.
-    const float near_floor = glm::max(near2, inside2), far_floor = glm::max(far2, inside2);
-    const float above = glm::max(height, 0.0f);
-    const float length = glm::sqrt(tangent2 + above * above);
-    const float share = intensity[c] * above / glm::max(length * near_floor * far_floor, 1e-37f);
-    near_weight[c] = share * far_floor;
-    far_weight[c] = share * near_floor;
-    inside_weight[c] = near2 <= inside2 ? near_weight[c] * near_floor : 0.0f;
+  // Height of the box's highest corner above the tangent plane.
+  const Lanes<W> margin = far * 2e-6f;
+  const Lanes<W> height = add_dot<W>(add_dot<W>(margin, broadcast<W>(vec3(std::fabs(n.x), std::fabs(n.y), std::fabs(n.z))), half), broadcast<W>(n), to_centre);
+  const Lanes<W> cosine = min_lanes<W>(max_lanes<W>(height, zero) * inverse_near, one);
+  Lanes<W> shining = load_lanes<W>(node.intensity) * cosine;
+  if (cones) {
+    const Lanes<W> facing = bound_facing<W>(node, to_centre, half, far);
+    shining = shining * min_lanes<W>(max_lanes<W>(facing, zero) * inverse_near, one);
   }
-  const float far_sum = sum_lanes<W>(far_weight);
-  if (!(far_sum > 1e-37f)) return false;  // also keeps its reciprocal finite
-  const float inside_sum = sum_lanes<W>(inside_weight);
-  const float* nearest = inside_sum > 0 ? inside_weight : near_weight;  // the nearest distance is 0: drop it
-  const float near_scale = 0.5f / (inside_sum > 0 ? inside_sum : sum_lanes<W>(near_weight));
-  const float far_scale = 0.5f / far_sum;
-  for (int c = 0; c < W; ++c) probability[c] = nearest[c] * near_scale + far_weight[c] * far_scale;
-  return true;
+
+  const Lanes<W> far_weight = shining * (inverse_far * inverse_far);
+  // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
+  const Lanes<W> inside_weight = keep_if_not_above<W>(near2, inside, shining);
+  const Lanes<W> near_weight = select_lanes<W>(greater_bits<W>(inside_weight, zero) != 0, inside_weight,
+                                               shining * (inverse_near * inverse_near));
+
+  // Near weights are scaled to the sum of the far ones, so that the average of both needs no other division.
+  const Lanes<W> near_sums = prefix_sum<W>(near_weight), far_sums = prefix_sum<W>(far_weight);
+  const float far_total = far_sums[W - 1];
+  const Lanes<W> scale = broadcast<W>(far_total / near_sums[W - 1]);
+  return {multiply_add<W>(near_weight, scale, far_weight), multiply_add<W>(near_sums, scale, far_sums),
+          far_total + far_total};
 }
 
-// Index of one of W values chosen in proportion to them, without branches: descends a binary tree of partial sums.
-// `r` in [0,1) comes back rescaled to [0,1) for the next choice.
+struct ChosenChild {
+  int lane;
+  float probability;
+  float r;  // uniform in [0,1) for the next choice
+};
+
+// A child in proportion to its weight; never one of weight 0. total > 0, r in [0,1).
 template <int W>
-LUMI_HD inline int choose_lane(const float* values, float& r) {
-  alignas(64) float sums[2 * W];  // W values, then their sums by halves: W/2, W/4, ... 1
-  for (int c = 0; c < W; ++c) sums[c] = values[c];
-  int at = 0;
-  for (int half = W / 2; half > 0; at += 2 * half, half /= 2)
-    for (int c = 0; c < half; ++c) sums[at + 2 * half + c] = sums[at + c] + sums[at + half + c];
-  r *= sums[at];
-  int lane = 0;
-  for (int half = 1; half < W; half *= 2) {  // half: lanes of the level above
-    at -= 2 * half;
-    const float left = sums[at + lane], right = sums[at + half + lane];
-    const bool take_right = (r >= left && right > 0) || !(left > 0);
-    r -= take_right ? left : 0.0f;
-    lane += take_right ? half : 0;
-  }
-  r = glm::clamp(r / values[lane], 0.0f, 0x1.fffffep-1f);
-  return lane;
+LUMI_HD LUMI_ALWAYS_INLINE ChosenChild choose_child(const ChildWeights<W>& children, float r) {
+  const float target = r * children.total;
+  const std::uint32_t positive = greater_bits<W>(children.weight, broadcast<W>(0));
+  const std::uint32_t beyond = greater_bits<W>(children.cumulative, broadcast<W>(target)) & positive;
+  const int lane = beyond != 0 ? lowest_bit(beyond) : highest_bit(positive | 1u);
+  alignas(64) float weights[W], sums[W];
+  store_lanes<W>(children.weight, weights);
+  store_lanes<W>(children.cumulative, sums);
+  const float weight = weights[lane];
+  const float rest = (target - (sums[lane] - weight)) / weight;
+  return {lane, weight / children.total, glm::min(glm::max(rest, 0.0f), 0x1.fffffep-1f)};
 }
+
+struct WalkPoint {
+  vec3 x;
+  float u0;  // chooses in the upper half of the levels
+  vec3 n;    // unit
+  float u1;  // chooses in the lower half, so that both keep enough bits for any depth
+};
 
 struct TreeSample {
   std::uint32_t emitter = kNoEmitter;
   float pdf = 0;
 };
 
-// One walk from the root. u.x chooses in the upper half of the levels, u.y in the lower half, so that both
-// keep enough bits for any depth.
+// One walk from the root for each of at most kWalkBatch points.
 template <int W>
-LUMI_HD inline TreeSample sample_light_tree(const LightTreeView& tree, vec3 x, vec3 n, vec2 u) {
-  std::uint32_t node = 0;
-  float pdf = 1, r = u.x;
+LUMI_HD inline void sample_light_tree(const LightTreeView& tree, const WalkPoint* points, int count,
+                                      TreeSample* samples) {
+  std::uint32_t node[kWalkBatch];
+  float pdf[kWalkBatch], r[kWalkBatch];
+  int alive[kWalkBatch];
+  int living = count;
+  for (int i = 0; i < count; ++i) {
+    alive[i] = i;
+    node[i] = 0;
+    pdf[i] = 1;
+    r[i] = points[i].u0;
+    samples[i] = {};
+  }
   const int middle = (tree.levels + 1) / 2;
   for (int level = 0; level < tree.levels; ++level) {
-    if (level == middle) r = u.y;
-    alignas(64) float probability[W];
-    const float* data =
-        tree.nodes + static_cast<std::size_t>(tree.level_first[level] + node) * (kNodeRows * W);
-    if (!child_probabilities<W>(data, tree.inside2, x, n, probability)) return {};
-    const int chosen = choose_lane<W>(probability, r);
-    pdf *= probability[chosen];
-    node = node * W + static_cast<std::uint32_t>(chosen);
+    const LightNode<W>* nodes = tree.level<W>(level);
+    const bool last = level + 1 == tree.levels;
+    const LightNode<W>* below = last ? nullptr : tree.level<W>(level + 1);
+    int kept = 0;
+    for (int k = 0; k < living; ++k) {
+      const int i = alive[k];
+      const WalkPoint& point = points[i];
+      const ChildWeights<W> children = weigh_children<W>(nodes[node[i]], level >= tree.first_cones, tree.inside2, point.x, point.n);
+      const ChosenChild chosen = choose_child<W>(children, level == middle ? point.u1 : r[i]);
+      node[i] = node[i] * W + static_cast<std::uint32_t>(chosen.lane);
+      pdf[i] *= chosen.probability;
+      r[i] = chosen.r;
+      alive[kept] = i;
+      kept += children.total > 0 ? 1 : 0;
+      if (last) {
+        prefetch(tree.leaf_emitters + node[i]);
+      } else {
+        const char* next = reinterpret_cast<const char*>(below + node[i]);
+        for (std::size_t line = 0; line < sizeof(LightNode<W>); line += 64) prefetch(next + line);
+      }
+    }
+    living = kept;
   }
-  return {tree.leaf_emitters[node], pdf};
+  for (int k = 0; k < living; ++k) samples[alive[k]] = {tree.leaf_emitters[node[alive[k]]], pdf[alive[k]]};
 }
 
-// Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same
-// order.
+// Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same order.
 template <int W>
 LUMI_HD inline float pdf_light_tree(const LightTreeView& tree, vec3 x, vec3 n, std::uint32_t emitter) {
   const std::uint32_t leaf = tree.emitter_leaves[emitter];
@@ -167,110 +217,14 @@ LUMI_HD inline float pdf_light_tree(const LightTreeView& tree, vec3 x, vec3 n, s
   for (int level = 1; level < tree.levels; ++level) span *= W;
   float pdf = 1;
   for (int level = 0; level < tree.levels; ++level, span /= W) {
-    alignas(64) float probability[W];
-    const std::uint32_t node = leaf / span / W;
-    const float* data =
-        tree.nodes + static_cast<std::size_t>(tree.level_first[level] + node) * (kNodeRows * W);
-    if (!child_probabilities<W>(data, tree.inside2, x, n, probability)) return 0;
-    pdf *= probability[leaf / span % W];
+    const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
+    const ChildWeights<W> children = weigh_children<W>(node, level >= tree.first_cones, tree.inside2, x, n);
+    if (!(children.total > 0)) return 0;
+    alignas(64) float weights[W];
+    store_lanes<W>(children.weight, weights);
+    pdf *= weights[leaf / span % W] / children.total;
   }
   return pdf;
 }
-
-// --- build
-// ----------------------------------------------------------------------------------------------------
-
-// Sorts after every Morton code: emitters without flux get no leaf.
-inline constexpr std::uint32_t kDroppedKey = 1u << 30;
-
-// keys[i] = (Morton code of the centre of emitter i's box, i).
-struct MortonKernel {
-  LightView lights;
-  vec3 lo, inverse;  // quantisation box: lower corner, 1/extent
-  std::span<KeyIndex> keys;
-
-  LUMI_HD void operator()(int i) const {
-    const std::uint32_t e = static_cast<std::uint32_t>(i);
-    const vec3 centre = emitter_bounds(lights.emitters[e]).centre();
-    const bool dropped = !(emitter_intensity(lights, e) > 0);
-    keys[e] = {dropped ? kDroppedKey : morton30((centre - lo) * inverse), e};
-  }
-};
-
-// Writes child `c` of the node at `data`.
-template <int W>
-LUMI_HD inline void store_child(float* data, int c, Box3 box, float intensity) {
-  const vec3 centre = box.centre();
-  // The larger side, and a little more than rounding can have taken off.
-  const vec3 half = glm::max(box.hi - centre, centre - box.lo) * (1 + 1e-6f) + glm::abs(centre) * 1e-7f;
-  data[kCentreX * W + c] = centre.x;
-  data[kCentreY * W + c] = centre.y;
-  data[kCentreZ * W + c] = centre.z;
-  data[kHalfX * W + c] = half.x;
-  data[kHalfY * W + c] = half.y;
-  data[kHalfZ * W + c] = half.z;
-  data[kIntensity * W + c] = intensity;
-}
-
-// The lowest level: node i over leaves W*i .. W*i+W-1, and the leaf -> emitter table.
-template <int W>
-struct LeafNodeKernel {
-  LightView lights;
-  std::span<const KeyIndex> keys;  // sorted
-  std::uint32_t count;             // leaves
-  float* nodes;                    // of this level
-  std::uint32_t* leaf_emitters;
-  std::uint32_t* emitter_leaves;  // or null
-
-  LUMI_HD void operator()(int i) const {
-    const std::uint32_t first = static_cast<std::uint32_t>(i) * W;
-    float* data = nodes + static_cast<std::size_t>(i) * (kNodeRows * W);
-    Box3 filler;  // bogus leaves repeat the first box, with no intensity
-    for (int c = 0; c < W; ++c) {
-      const std::uint32_t leaf = first + static_cast<std::uint32_t>(c);
-      if (leaf >= count) {
-        store_child<W>(data, c, filler, 0);
-        continue;
-      }
-      const std::uint32_t e = keys[leaf].index;
-      leaf_emitters[leaf] = e;
-      if (emitter_leaves) emitter_leaves[e] = leaf;
-      const Box3 box = emitter_bounds(lights.emitters[e]);
-      if (c == 0) filler = box;
-      store_child<W>(data, c, box, emitter_intensity(lights, e));
-    }
-  }
-};
-
-// An upper level: each child of node i summarises one node of the level below.
-template <int W>
-struct InnerNodeKernel {
-  const float* below;
-  std::uint32_t below_count;
-  float* nodes;
-
-  LUMI_HD void operator()(int i) const {
-    float* data = nodes + static_cast<std::size_t>(i) * (kNodeRows * W);
-    Box3 filler;
-    for (int c = 0; c < W; ++c) {
-      const std::uint32_t child = static_cast<std::uint32_t>(i) * W + static_cast<std::uint32_t>(c);
-      if (child >= below_count) {
-        store_child<W>(data, c, filler, 0);
-        continue;
-      }
-      const float* from = below + static_cast<std::size_t>(child) * (kNodeRows * W);
-      Box3 box;
-      float intensity = 0;
-      for (int k = 0; k < W; ++k) {
-        const vec3 centre(from[kCentreX * W + k], from[kCentreY * W + k], from[kCentreZ * W + k]);
-        const vec3 half(from[kHalfX * W + k], from[kHalfY * W + k], from[kHalfZ * W + k]);
-        box = unite(box, Box3{centre - half, centre + half});  // bogus children repeat a real box
-        intensity += from[kIntensity * W + k];
-      }
-      if (c == 0) filler = box;
-      store_child<W>(data, c, box, intensity);
-    }
-  }
-};
 
 }  // namespace lumigrove

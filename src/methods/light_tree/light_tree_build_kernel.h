@@ -1,0 +1,158 @@
+// Kernels that build the perfect light tree: Morton codes of the emitters, then every level from the one below it.
+// The method and its header block are in light_tree_kernel.h.
+#pragma once
+
+#include <span>
+
+#include "base/morton.h"
+#include "device/sort.h"
+#include "lights/emitter.h"
+#include "methods/light_tree/light_tree_kernel.h"
+
+namespace lumigrove {
+
+// Sorts after every Morton code: emitters without flux get no leaf.
+inline constexpr std::uint32_t kDroppedKey = 1u << 30;
+
+// keys[i] = (Morton code of the centre of emitter i's box, i).
+struct MortonKernel {
+  LightView lights;
+  vec3 lo, inverse;  // quantisation box: lower corner, 1/extent
+  std::span<KeyIndex> keys;
+
+  LUMI_HD void operator()(int i) const {
+    const std::uint32_t e = static_cast<std::uint32_t>(i);
+    const vec3 centre = emitter_bounds(lights.emitters[e]).centre();
+    const bool dropped = !(emitter_intensity(lights, e) > 0);
+    keys[e] = {dropped ? kDroppedKey : morton30((centre - lo) * inverse), e};
+  }
+};
+
+// A cone as nodes store it.
+struct PackedCone {
+  std::int8_t x = 0, y = 0, z = 0;
+  std::uint8_t radius = 255;
+
+  LUMI_HD vec3 axis() const { return vec3(x, y, z) / kConeAxis; }
+  LUMI_HD float width() const { return 2 * static_cast<float>(radius) / kConeRadius; }
+};
+
+// |axis| <= 1, not exactly stored: `radius` is to be measured from PackedCone::axis().
+LUMI_HD inline PackedCone pack_axis(vec3 axis) {
+  const auto pack = [](float v) { return static_cast<std::int8_t>(v * kConeAxis + (v < 0 ? -0.5f : 0.5f)); };
+  return {pack(axis.x), pack(axis.y), pack(axis.z), 0};
+}
+
+// Rounded up, with enough for the roundings of a walk's dot products.
+LUMI_HD inline std::uint8_t pack_radius(float radius) {
+  return static_cast<std::uint8_t>(glm::clamp(glm::ceil((radius + 1e-4f) * (0.5f * kConeRadius)), 0.0f, kConeRadius));
+}
+
+struct NodeChild {
+  Box3 box;
+  float intensity = 0;
+  PackedCone cone;
+};
+
+template <int W>
+LUMI_HD inline void store_child(LightNode<W>& node, int c, const NodeChild& child) {
+  const vec3 centre = child.box.centre();
+  // The larger side, and a little more than rounding can have taken off.
+  const vec3 half =
+      glm::max(child.box.hi - centre, centre - child.box.lo) * (1 + 1e-6f) + glm::abs(centre) * 1e-7f;
+  node.centre_x[c] = centre.x;
+  node.centre_y[c] = centre.y;
+  node.centre_z[c] = centre.z;
+  node.half_x[c] = half.x;
+  node.half_y[c] = half.y;
+  node.half_z[c] = half.z;
+  node.intensity[c] = child.intensity;
+  node.axis_x[c] = child.cone.x;
+  node.axis_y[c] = child.cone.y;
+  node.axis_z[c] = child.cone.z;
+  node.radius[c] = child.cone.radius;
+}
+
+LUMI_HD inline NodeChild emitter_child(const LightView& lights, std::uint32_t e, float inverse_flux) {
+  const NormalCone cone = emission_cone(lights, lights.emitters[e]);
+  PackedCone packed = pack_axis(cone.axis);
+  packed.radius = pack_radius(cone.radius + glm::length(cone.axis - packed.axis()));
+  return {emitter_bounds(lights.emitters[e]), emitter_intensity(lights, e) * inverse_flux, packed};
+}
+
+// The lowest level: node i over leaves W*i .. W*i+W-1, and the leaf -> emitter table.
+template <int W>
+struct LeafNodeKernel {
+  LightView lights;
+  std::span<const KeyIndex> keys;  // sorted
+  std::uint32_t count;             // leaves
+  float inverse_flux;
+  LightNode<W>* nodes;  // of this level
+  std::uint32_t* leaf_emitters;
+  std::uint32_t* emitter_leaves;  // or null
+
+  LUMI_HD void operator()(int i) const {
+    const std::uint32_t first = static_cast<std::uint32_t>(i) * W;
+    NodeChild filler;  // bogus leaves repeat the first box, with no intensity
+    for (int c = 0; c < W; ++c) {
+      const std::uint32_t leaf = first + static_cast<std::uint32_t>(c);
+      if (leaf >= count) {
+        store_child(nodes[i], c, filler);
+        continue;
+      }
+      const std::uint32_t e = keys[leaf].index;
+      leaf_emitters[leaf] = e;
+      if (emitter_leaves) emitter_leaves[e] = leaf;
+      const NodeChild child = emitter_child(lights, e, inverse_flux);
+      if (c == 0) filler = {child.box, 0, child.cone};
+      store_child(nodes[i], c, child);
+    }
+  }
+};
+
+// One child that stands for all children of `node`. Bogus ones repeat a real box and a real cone.
+template <int W>
+LUMI_HD inline NodeChild summarise_node(const LightNode<W>& node) {
+  NodeChild sum;
+  vec3 axes(0);
+  for (int k = 0; k < W; ++k) {
+    const vec3 centre(node.centre_x[k], node.centre_y[k], node.centre_z[k]);
+    const vec3 half(node.half_x[k], node.half_y[k], node.half_z[k]);
+    sum.box = unite(sum.box, Box3{centre - half, centre + half});
+    sum.intensity += node.intensity[k];
+    axes += vec3(node.axis_x[k], node.axis_y[k], node.axis_z[k]);
+  }
+  const float length = glm::length(axes);
+  sum.cone = pack_axis(length > 0.5f ? axes / length : vec3(0));
+  float radius = 0;
+  for (int k = 0; k < W; ++k) {
+    const PackedCone cone{node.axis_x[k], node.axis_y[k], node.axis_z[k], node.radius[k]};
+    radius = glm::max(radius, cone.width() + glm::length(cone.axis() - sum.cone.axis()));
+  }
+  sum.cone.radius = pack_radius(radius);
+  return sum;
+}
+
+// An upper level: each child of node i summarises one node of the level below.
+template <int W>
+struct InnerNodeKernel {
+  const LightNode<W>* below;
+  std::uint32_t below_count;
+  LightNode<W>* nodes;
+
+  LUMI_HD void operator()(int i) const {
+    NodeChild filler;
+    for (int c = 0; c < W; ++c) {
+      const std::uint32_t child = static_cast<std::uint32_t>(i) * W + static_cast<std::uint32_t>(c);
+      if (child >= below_count) {
+        store_child(nodes[i], c, filler);
+        continue;
+      }
+      const NodeChild sum = summarise_node(below[child]);
+      if (c == 0) filler = {sum.box, 0, sum.cone};
+      store_child(nodes[i], c, sum);
+    }
+  }
+};
+
+}  // namespace lumigrove
