@@ -687,10 +687,3 @@ TEST_F(Gltf, IndicesOutOfRangeAreRefusedAndNaNVerticesDropTheirTriangles) {
 
 }  // namespace
 }  // namespace lumigrove
-
-#if defined(__SANITIZE_ADDRESS__)
-// OpenImageIO's PNG reader fetches its own error text inside a libpng callback, which libpng leaves by longjmp: the
-// string of a truncated PNG is never freed (OpenImageIO 2.4, PNGInput::PngReadCallback).
-extern "C" const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:ImageInput::geterror\n"; }
-#endif
