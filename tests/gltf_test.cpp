@@ -561,7 +561,12 @@ TEST_F(Gltf, TexturesAreReadFromTheSceneFolderAndNowhereElse) {
 
 TEST_F(Gltf, DamagedImagesAreRefused) {
   const std::string image = png(64, 64, 3, std::vector<std::uint16_t>(64 * 64 * 3, 77));
-  error_of(textured(png_uri(image.substr(0, image.size() / 2))));
+  ::testing::internal::CaptureStderr();
+  EXPECT_TRUE(contains(error_of(textured(png_uri(image.substr(0, image.size() / 2)))), "cut short"));
+  std::string flipped = image;
+  flipped[flipped.size() / 2] ^= 0x55;
+  EXPECT_TRUE(contains(error_of(textured(png_uri(flipped))), "checksum"));
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   error_of(textured("data:image/png;base64,AAAA"));
   error_of(textured("data:image/png;base64,!!!!"));
   error_of(textured("data:image/png,plain"));
