@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -7,6 +6,7 @@
 
 #include "commands.h"
 #include "image/difference.h"
+#include "temp_folder.h"
 
 namespace lumigrove {
 namespace {
@@ -21,16 +21,11 @@ struct Outcome {
 class Compare : public testing::Test {
  protected:
   void SetUp() override {
-    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    folder_ = fs::path(testing::TempDir()) / ("lumigrove_compare_" + std::to_string(getpid()) + name);
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     write("ref.exr", 1);
     write("same.exr", 1);
     write("near.exr", 1.1f);
     write("far.exr", 2);
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   // A ramp times `gain`, 24x16 pixels, with a `direct` layer of half its light.
   void write(const std::string& name, float gain, int width = 24) const {
@@ -69,7 +64,7 @@ class Compare : public testing::Test {
     return outcome;
   }
 
-  fs::path folder_;
+  const TempFolder folder_;
 };
 
 TEST_F(Compare, PrintsEveryMetricOfEveryImageAndTheFormulas) {
@@ -201,7 +196,8 @@ TEST(Difference, HeatMapIsCloseToMagma) {
 }
 
 TEST(Difference, PicturesAreWrittenAsTheyAre) {
-  const fs::path file = fs::path(testing::TempDir()) / ("lumigrove_picture_" + std::to_string(getpid()) + ".png");
+  const fs::path file =
+      fs::path(testing::TempDir()) / ("lumigrove_picture_" + std::to_string(getpid()) + ".png");
   std::vector<float> picture;
   for (int i = 0; i < 255; ++i) picture.push_back(static_cast<float>(i) / 255);
   write_picture(picture, 85, 1, file);
