@@ -3,6 +3,7 @@ find_package(glm REQUIRED)
 find_package(TBB REQUIRED)
 find_package(embree 3 REQUIRED)
 find_package(assimp REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(CLI11 REQUIRED)
@@ -23,7 +24,8 @@ set_target_properties(OpenImageIO::OpenImageIO PROPERTIES INTERFACE_INCLUDE_DIRE
                       INTERFACE_SYSTEM_INCLUDE_DIRECTORIES "")
 
 # What the static library must be linked with; lumigrove-config.cmake finds the same packages.
-set(LUMIGROVE_LINKED_LIBRARIES TBB::tbb embree assimp::assimp OpenImageIO::OpenImageIO fmt::fmt spdlog::spdlog)
+set(LUMIGROVE_LINKED_LIBRARIES TBB::tbb embree assimp::assimp ZLIB::ZLIB OpenImageIO::OpenImageIO fmt::fmt
+    spdlog::spdlog)
 
 # For everything built here. Third-party headers are system headers: their warnings are not ours.
 add_library(lumigrove_dependencies INTERFACE)

@@ -8,7 +8,7 @@ packages=(
   libembree-dev libtbb-dev                     # rays, threads
   libglm-dev                                   # vectors
   libtinygltf-dev nlohmann-json3-dev           # glTF
-  libassimp-dev zlib1g-dev                     # OBJ, PLY, FBX (Assimp's CMake package links zlib by name)
+  libassimp-dev zlib1g-dev                     # OBJ, PLY, FBX; checksums (and Assimp's CMake package links zlib by name)
   libopenimageio-dev openimageio-tools         # images (the CMake package of the former checks for tools of the latter)
   libcli11-dev libspdlog-dev libfmt-dev libtomlplusplus-dev  # command line, log, settings files
   libgtest-dev libbenchmark-dev                # tests, bench

@@ -142,6 +142,16 @@ TEST(AssimpImport, FilesOutsideTheScenesFolderAreRefused) {
   EXPECT_NE(error_of([&] { import_assimp(texture); }).find("leaves the scene's folder"), std::string::npos);
 }
 
+TEST(AssimpImport, ObjNumbersMayBeginWithAPointAndLinesWithABlank) {
+  const TempFolder folder;
+  const Scene scene = import_assimp(folder.write(
+      "a.obj", " v .5 0 0\r\nv\t0 .25 0\nv 0 0 -.125\nvt .5 0\nvt 0 .5\nvt 0 0\ng a .5\n\tf 1/1 2/2 3/3\n"));
+  ASSERT_EQ(scene.meshes.size(), 1u);
+  const std::vector<vec3> expected = {vec3(0.5f, 0, 0), vec3(0, 0.25f, 0), vec3(0, 0, -0.125f)};
+  EXPECT_EQ(scene.meshes[0].positions, expected);
+  EXPECT_EQ(scene.meshes[0].uv0.at(0), vec2(0.5f, 1));
+}
+
 TEST(AssimpImport, MissingTextureIsNamed) {
   const TempFolder folder;
   const std::string sentence = error_of([&] { import_with_material(folder, "map_Kd gone.png\n"); });

@@ -1,7 +1,6 @@
 #include "base/atomic_file.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "base/srgb.h"
+#include "temp_folder.h"
 
 namespace lumigrove {
 namespace {
@@ -19,18 +19,7 @@ namespace fs = std::filesystem;
 
 class AtomicFile : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / ("lumigrove_atomic_file_" + std::to_string(getpid()));
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::ptrdiff_t entries() const {
-    return std::distance(fs::directory_iterator(folder_), fs::directory_iterator());
-  }
-
-  fs::path folder_;
+  const TempFolder folder_;
 };
 
 TEST_F(AtomicFile, ReplacesTheFileAndLeavesNoTemporary) {
@@ -40,7 +29,7 @@ TEST_F(AtomicFile, ReplacesTheFileAndLeavesNoTemporary) {
   std::ifstream in(folder_ / "a.bin", std::ios::binary);
   const std::vector<std::uint8_t> found{std::istreambuf_iterator<char>(in), {}};
   EXPECT_EQ(found, second);
-  EXPECT_EQ(entries(), 1);
+  EXPECT_EQ(folder_.entries().size(), 1u);
 }
 
 TEST_F(AtomicFile, FailureNamesTheFileAndLeavesNothing) {
@@ -53,7 +42,7 @@ TEST_F(AtomicFile, FailureNamesTheFileAndLeavesNothing) {
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("taken"), std::string::npos);
   }
-  EXPECT_EQ(entries(), 1);
+  EXPECT_EQ(folder_.entries().size(), 1u);
 }
 
 TEST(Srgb, CurveAndItsInverseAgreeForAll8BitValues) {

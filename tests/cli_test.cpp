@@ -121,6 +121,15 @@ TEST_F(Cli, MistakesAreOneSentenceAndLeaveNothingBehind) {
       {2, {"render", "single", "-o", "a.exr", "--size", "3x4", "--width", "3"}, "excludes"},
       {2, {"render", "single", "-o", "a.exr", "--frames", "1", "--time", "3"}, "excludes"},
       {2, {"render", "single", "-o", "a.exr", "--progress", "loud"}, "loud"},
+      {2, {"render", "single", "-o", "a.exr", "--size", "32"}, "--size must be followed by W H"},
+      {2, {"render", "single", "-o", "a.exr", "--exposure", "nan"}, "--exposure"},
+      {2, {"render", "single", "-o", "a.exr", "--exposure", "101"}, "from -100 to 100"},
+      {2, {"render", "single", "-o", "a.exr", "--frames", ""}, "--frames"},
+      {2, {"render", "single", "-o", "a.exr", "--time", ""}, "--time"},
+      {2, {"render", "single", "-o", "a.exr", "--preset", ""}, "--preset"},
+      {2, {"render", "single", "-o", "a.exr", "--environment", ""}, "--environment"},
+      {2, {"render", "single", "-o", "a.exr", "--log-file", ""}, "--log-file"},
+      {2, {"compare", "-r", "a.exr", "b.exr", "--pixels-per-degree", "nan"}, "--pixels-per-degree"},
       {2, {"list", "method"}, "'methods'"},
       {1, {"render", "single", "-o", "a.exr", "--preset", "powr"}, "'power'"},
       {1, {"render", "single", "-o", "a.exr", "--method", "nothing"}, "unknown method 'nothing'"},
@@ -150,7 +159,9 @@ TEST_F(Cli, MistakesAreOneSentenceAndLeaveNothingBehind) {
       {1, {"render", "single", "-o", "a.exr", "--device", "abacus"}, "abacus"},
       {1, {"render", "single", "-o", "a.exr", "--environment", "1,2,-3"}, "environment"},
       {1, {"render", "single", "-o", "a.exr", "--environment", "missing.hdr"}, "missing.hdr"},
+      {1, {"render", "single", "-o", "a.exr", "--environment", "1,2"}, "neither three numbers"},
       {1, {"render", "single", "-o", "a.tga"}, ".exr"},
+      {1, {"render", "single", "-o", "a.exr", "-o", "./a.exr"}, "given twice"},
       {1, {"render", "single", "-o", "missing/a.exr"}, "no folder 'missing'"},
       {1, {"render", "single", "-o", "/proc/a.exr"}, "/proc/a.exr"},
       {1, {"render", "no-such-scene", "-o", "a.exr"}, "no-such-scene"},
@@ -173,6 +184,17 @@ TEST_F(Cli, MistakesAreOneSentenceAndLeaveNothingBehind) {
         << "'" << mistake.part_of_message << "' is not in " << outcome.err;
     EXPECT_EQ(files(), std::vector<std::string>{}) << outcome.err;
   }
+}
+
+TEST_F(Cli, ScenesThatCannotShowAnythingSayWhy) {
+  const auto warnings = [&](const char* name, const char* text) {
+    std::ofstream(folder_ / name) << text;
+    return run({"render", name, "--size", "16x8", "-o", "a.png"}).err;
+  };
+  const char* dark = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  EXPECT_NE(warnings("dark.obj", dark).find("nothing in 'dark.obj' shines"), std::string::npos);
+  const std::string empty = warnings("empty.gltf", R"({"asset": {"version": "2.0"}})");
+  EXPECT_NE(empty.find("'empty.gltf' holds no triangles"), std::string::npos) << empty;
 }
 
 TEST_F(Cli, ImagesWithoutAReceiptCannotBeRerun) {
@@ -391,6 +413,15 @@ pid_t start_tool(const std::string& arguments, const fs::path& out, const fs::pa
     _exit(127);
   }
   return child;
+}
+
+TEST_F(Cli, LostOutputIsAFailure) {
+  const fs::path err = folder_ / "err";
+  int status = 0;
+  ASSERT_NE(waitpid(start_tool("list settings", "/dev/full", err), &status, 0), -1);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 1);
+  EXPECT_TRUE(is_one_line(contents(err))) << contents(err);
 }
 
 TEST_F(Cli, InterruptKeepsTheFinishedSamples) {

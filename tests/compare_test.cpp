@@ -1,12 +1,12 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "commands.h"
 #include "image/difference.h"
+#include "temp_folder.h"
+#include "tool.h"
 
 namespace lumigrove {
 namespace {
@@ -15,22 +15,17 @@ namespace fs = std::filesystem;
 
 struct Outcome {
   int status = 0;  // as main() would return
-  std::string out, err, error;
+  std::string out, err;
 };
 
 class Compare : public testing::Test {
  protected:
   void SetUp() override {
-    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    folder_ = fs::path(testing::TempDir()) / ("lumigrove_compare_" + std::to_string(getpid()) + name);
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
     write("ref.exr", 1);
     write("same.exr", 1);
     write("near.exr", 1.1f);
     write("far.exr", 2);
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   // A ramp times `gain`, 24x16 pixels, with a `direct` layer of half its light.
   void write(const std::string& name, float gain, int width = 24) const {
@@ -47,34 +42,25 @@ class Compare : public testing::Test {
 
   // compare -r ref.exr ARGUMENTS
   Outcome run(const std::vector<std::string>& arguments) const {
-    std::vector<std::string> all = {"compare", "-r", path("ref.exr")};
-    all.insert(all.end(), arguments.begin(), arguments.end());
-    std::reverse(all.begin(), all.end());  // as CLI11 wants them
+    std::vector<std::string> words = {"lumigrove", "compare", "-r", path("ref.exr")};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> pointers;
+    for (std::string& word : words) pointers.push_back(word.data());
     Outcome outcome;
-    CLI::App app;
-    add_compare_command(app);
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
-    try {
-      app.parse(all);
-    } catch (const CLI::ParseError& error) {
-      outcome.status = 2, outcome.error = error.what();
-    } catch (const ExitCode& code) {
-      outcome.status = code.status;
-    } catch (const Error& error) {
-      outcome.status = 1, outcome.error = error.what();
-    }
+    outcome.status = run_tool(static_cast<int>(words.size()), pointers.data());
     outcome.out = testing::internal::GetCapturedStdout();
     outcome.err = testing::internal::GetCapturedStderr();
     return outcome;
   }
 
-  fs::path folder_;
+  const TempFolder folder_;
 };
 
 TEST_F(Compare, PrintsEveryMetricOfEveryImageAndTheFormulas) {
   const Outcome outcome = run({path("near.exr"), path("far.exr")});
-  EXPECT_EQ(outcome.status, 0) << outcome.error;
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
   for (const MetricInfo& info : metrics()) {
     EXPECT_NE(outcome.out.find(info.label), std::string::npos);
     EXPECT_NE(outcome.out.find(info.formula), std::string::npos);
@@ -86,7 +72,7 @@ TEST_F(Compare, PrintsEveryMetricOfEveryImageAndTheFormulas) {
 TEST_F(Compare, JsonHoldsTheSameNumbersAsTheLibrary) {
   const Outcome outcome =
       run({path("same.exr"), path("far.exr"), "--json", "--exposure", "-1", "--tone", "srgb"});
-  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
   const nlohmann::json json = nlohmann::json::parse(outcome.out);
   const Comparison far =
       compare_images(rgb_of(read_image(path("ref.exr")), "", "r"),
@@ -106,12 +92,12 @@ TEST_F(Compare, LayersAreComparedByName) {
   EXPECT_NEAR(rmse_of({path("far.exr"), "--json", "--layer", "direct"}), beauty / 2, 1e-3 * beauty);
   const Outcome missing = run({path("far.exr"), "--layer", "N"});
   EXPECT_EQ(missing.status, 1);
-  EXPECT_NE(missing.error.find("N.R"), std::string::npos);
+  EXPECT_NE(missing.err.find("N.R"), std::string::npos);
 }
 
 TEST_F(Compare, BrokenLimitsAreNamedAndChangeTheStatus) {
   const Outcome kept = run({path("near.exr"), "--fail-above", "rmse=10", "--fail-below", "ssim=0.1"});
-  EXPECT_EQ(kept.status, 0) << kept.error;
+  EXPECT_EQ(kept.status, 0) << kept.err;
   EXPECT_EQ(kept.err, "");
   const Outcome broken = run({path("same.exr"), path("far.exr"), "--fail-above", "rmse=0.01", "--fail-above",
                               "flip=1", "--fail-below", "ssim=0.9999"});
@@ -133,7 +119,7 @@ TEST_F(Compare, WrongLimitsAreRefusedWithASentence) {
   const auto sentence = [&](const std::string& option, const std::string& limit) {
     const Outcome outcome = run({path("same.exr"), option, limit});
     EXPECT_EQ(outcome.status, 2) << limit;
-    return outcome.error;
+    return outcome.err;
   };
   EXPECT_NE(sentence("--fail-above", "psnr=3").find("rmse, relmse, ssim, flip"), std::string::npos);
   EXPECT_NE(sentence("--fail-above", "rmse").find("METRIC=VALUE"), std::string::npos);
@@ -148,10 +134,10 @@ TEST_F(Compare, DifferentSizesAndMissingFilesAreErrors) {
   write("wide.exr", 1, 25);
   const Outcome sizes = run({path("wide.exr")});
   EXPECT_EQ(sizes.status, 1);
-  EXPECT_NE(sizes.error.find("25x16"), std::string::npos) << sizes.error;
+  EXPECT_NE(sizes.err.find("25x16"), std::string::npos) << sizes.err;
   const Outcome missing = run({path("missing.exr")});
   EXPECT_EQ(missing.status, 1);
-  EXPECT_NE(missing.error.find("missing.exr"), std::string::npos);
+  EXPECT_NE(missing.err.find("missing.exr"), std::string::npos);
   EXPECT_EQ(run({}).status, 2);
 }
 
@@ -159,7 +145,7 @@ TEST_F(Compare, WritesThreePicturesForEachImageUnderDifferentNames) {
   fs::create_directories(folder_ / "other");
   write("other/far.exr", 0.5f);
   const Outcome outcome = run({path("far.exr"), path("other/far.exr"), "-o", path("pictures")});
-  ASSERT_EQ(outcome.status, 0) << outcome.error;
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
   for (const char* stem : {"far", "far-2"})
     for (const char* kind : {"signed", "absolute", "flip"}) {
       const Image picture = read_image(folder_ / "pictures" / (std::string(stem) + "-" + kind + ".png"));
@@ -201,7 +187,8 @@ TEST(Difference, HeatMapIsCloseToMagma) {
 }
 
 TEST(Difference, PicturesAreWrittenAsTheyAre) {
-  const fs::path file = fs::path(testing::TempDir()) / ("lumigrove_picture_" + std::to_string(getpid()) + ".png");
+  const fs::path file =
+      fs::path(testing::TempDir()) / ("lumigrove_picture_" + std::to_string(getpid()) + ".png");
   std::vector<float> picture;
   for (int i = 0; i < 255; ++i) picture.push_back(static_cast<float>(i) / 255);
   write_picture(picture, 85, 1, file);

@@ -192,6 +192,7 @@ TEST(DefaultCamera, SeesTheWholeScene) {
   const SceneState state = evaluate(scene, 0);
   const CameraInstance camera = default_camera(state);
   const float limit = std::tan(camera.camera.vertical_fov / 2);
+  float largest = 0;
   for (const vec3 corner :
        {state.bounds.lo, state.bounds.hi, vec3(state.bounds.lo.x, state.bounds.hi.y, 3)}) {
     const vec3 d = corner - camera.position;
@@ -199,7 +200,11 @@ TEST(DefaultCamera, SeesTheWholeScene) {
     EXPECT_GT(depth, camera.camera.znear);
     EXPECT_LE(std::abs(glm::dot(d, camera.up)), limit * depth);
     EXPECT_LE(std::abs(glm::dot(d, camera.right)), limit * depth);
+    largest =
+        std::max(largest, std::max(std::abs(glm::dot(d, camera.up)), std::abs(glm::dot(d, camera.right))) /
+                              (limit * depth));
   }
+  EXPECT_GT(largest, 0.9f);  // no smaller than it must be
 }
 
 TEST(Validate, DropsTrianglesWithoutAreaOrWithNaNInOneWarning) {

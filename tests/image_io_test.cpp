@@ -1,14 +1,13 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <limits>
 
 #include "lumigrove/image.h"
+#include "temp_folder.h"
 
 namespace lumigrove {
 namespace {
@@ -20,17 +19,9 @@ constexpr std::size_t kPixels = kWidth * kHeight;
 
 class ImageIo : public testing::Test {
  protected:
-  void SetUp() override {
-    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    folder_ = fs::path(testing::TempDir()) / ("lumigrove_image_io_" + std::to_string(getpid()) + name);
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
+  bool folder_is_empty() const { return folder_.entries().empty(); }
 
-  bool folder_is_empty() const { return fs::is_empty(folder_); }
-
-  fs::path folder_;
+  const TempFolder folder_;
 };
 
 // Values that a half float cannot hold exactly, different in every channel.
@@ -64,15 +55,6 @@ Image full_image() {
 
 Image color_image(const std::vector<float>& rgb, int width, int height) {
   return {width, height, {{"", {"R", "G", "B"}, rgb, {}}}, {}};
-}
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST_F(ImageIo, ExrGivesBackEveryLayer) {

@@ -4,9 +4,10 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numeric>
+
+#include "temp_folder.h"
 
 namespace lumigrove {
 namespace {
@@ -36,15 +37,6 @@ struct TexturedPair {
 
 double mean(const std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 TEST(Metrics, EqualImagesHaveNoError) {

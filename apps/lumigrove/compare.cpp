@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "checks.h"
 #include "commands.h"
 #include "image/difference.h"
 #include "metrics/metrics.h"
@@ -256,7 +257,7 @@ void add_tone(CLI::App& command, CompareOptions& options) {
       .add_option("--exposure", options.metrics.tone.exposure_ev,
                   "Exposure before SSIM, FLIP and pictures (EV, default 0; +1 doubles)")
       ->type_name("EV")
-      ->check(CLI::Range(-100.0, 100.0));
+      ->check(number_in(-100, 100));
   command
       .add_option("--tone,--curve", options.curve,
                   "Tone curve before SSIM, FLIP and pictures (default filmic)")
@@ -265,7 +266,7 @@ void add_tone(CLI::App& command, CompareOptions& options) {
       .add_option("--pixels-per-degree", options.metrics.pixels_per_degree,
                   "Pixels in a degree of the viewer's visual angle, for FLIP (default 67.02)")
       ->type_name("N")
-      ->check(CLI::Range(1.0, 1000.0));
+      ->check(number_in(1, 1000));
 }
 
 }  // namespace
@@ -288,6 +289,7 @@ void add_compare_command(CLI::App& app) {
       ->add_option("-o,--output", options->folder,
                    "Folder for pictures of the difference: NAME-signed.png (blue darker, red brighter), "
                    "NAME-absolute.png, NAME-flip.png")
+      ->check(not_empty())
       ->type_name("FOLDER");
   command->add_flag("--json", options->json, "Print JSON instead of a table");
   add_tone(*command, *options);

@@ -7,6 +7,7 @@
 
 #include <filesystem>
 
+#include "checks.h"
 #include "lumigrove/error.h"
 
 namespace lumigrove {
@@ -44,7 +45,8 @@ std::shared_ptr<LogOptions> add_log_options(CLI::App& command) {
       ->transform(CLI::IsMember(kLevels))
       ->excludes(quiet)
       ->excludes(verbose);
-  command.add_option("--log-file", options->file, "Write all messages to this file as well");
+  command.add_option("--log-file", options->file, "Write all messages to this file as well")
+      ->check(not_empty());
   return options;
 }
 

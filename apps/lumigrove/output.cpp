@@ -7,8 +7,10 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "base/atomic_file.h"
+#include "checks.h"
 
 namespace lumigrove {
 namespace {
@@ -49,10 +51,17 @@ std::shared_ptr<OutputOptions> add_output_options(CLI::App& command) {
   command
       .add_option("--exposure", options->exposure, "Exposure of .png and .jpg (EV, default 0; +1 doubles)")
       ->type_name("EV")
-      ->check(CLI::Range(-100.0, 100.0));
+      ->check(number_in(-100, 100));
   command.add_option("--tone", options->curve, "Tone curve of .png and .jpg (default filmic)")
       ->check(CLI::IsMember({"filmic", "srgb"}));
   return options;
+}
+
+void require_distinct(const std::vector<std::string>& files) {
+  std::set<fs::path> seen;
+  for (const std::string& file : files)
+    if (!seen.insert(fs::absolute(file).lexically_normal()).second)
+      throw Error(fmt::format("output '{}' is given twice", file));
 }
 
 void require_writable(const std::string& name, const std::vector<std::string>& extensions) {

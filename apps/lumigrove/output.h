@@ -24,6 +24,9 @@ std::shared_ptr<OutputOptions> add_output_options(CLI::App& command);
 // Extensions that write_image knows.
 extern const std::vector<std::string> kImageExtensions;
 
+// Throws Error when two of the names mean one file.
+void require_distinct(const std::vector<std::string>& files);
+
 // Throws Error unless `file` has one of `extensions` and lies in an existing, writable folder, and unless it
 // is a regular file if it exists already.
 void require_writable(const std::string& file, const std::vector<std::string>& extensions = kImageExtensions);

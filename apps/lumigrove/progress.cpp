@@ -51,6 +51,12 @@ ProgressStyle progress_style(const std::string& name) {
   throw Error(fmt::format("--progress is '{}', but must be auto, bar, plain, json or none", name));
 }
 
+void add_progress_option(CLI::App& command, std::string& name) {
+  command
+      .add_option("--progress", name, "auto, bar, plain, json or none (default auto: a bar on a terminal)")
+      ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}));
+}
+
 ProgressPrinter::ProgressPrinter(ProgressStyle style, int frame_count)
     : style_(style), frame_count_(frame_count) {}
 

@@ -1,6 +1,7 @@
 // Progress of a render or of a sequence of frames, on stderr.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <string>
 
@@ -17,6 +18,9 @@ enum class ProgressStyle {
 
 // "auto" (bar on a terminal, plain lines otherwise), "bar", "plain", "json" or "none".
 ProgressStyle progress_style(const std::string& name);
+
+// --progress NAME
+void add_progress_option(CLI::App& command, std::string& name);
 
 class ProgressPrinter {
  public:

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <filesystem>
 
+#include "base/vec.h"
+#include "checks.h"
 #include "commands.h"
 #include "devices.h"
 #include "frame/value_text.h"
@@ -67,9 +69,26 @@ void warn_beyond_animation(const Scene& scene, const std::vector<Task>& tasks) {
                  scene.name);
 }
 
+bool shines(const Scene& scene) {
+  const auto is_bright = [](const PunctualLight& light) { return max_component(light.color) > 0; };
+  const auto emits = [&](const Mesh& mesh) {
+    return max_component(scene.materials[static_cast<std::size_t>(mesh.material)].emission) > 0;
+  };
+  return max_component(scene.environment.radiance) > 0 ||
+         std::any_of(scene.lights.begin(), scene.lights.end(), is_bright) ||
+         std::any_of(scene.meshes.begin(), scene.meshes.end(), emits);
+}
+
+// A black image without a word would leave its maker to search for the reason.
+void warn_if_black(const Scene& scene) {
+  if (scene.meshes.empty()) spdlog::warn("'{}' holds no triangles", scene.name);
+  if (!shines(scene)) spdlog::warn("nothing in '{}' shines; --environment adds light", scene.name);
+}
+
 // Files first: no scene is loaded and nothing rendered for an output that cannot be written.
 void check_outputs(const RenderOptions& options, const std::vector<Task>& tasks) {
   if (options.output->files.empty()) throw CLI::RequiredError("-o,--output");
+  require_distinct(options.output->files);
   for (const Task& task : tasks)
     for (const std::string& file : task.files) require_writable(file);
 }
@@ -115,6 +134,7 @@ void run(const RenderOptions& options) {
     fmt::print("{}\n", camera_as_options(scene, tasks[0].settings));
     return;
   }
+  warn_if_black(scene);
   warn_beyond_animation(scene, tasks);
   render_tasks(options, scene, tasks);
 }
@@ -127,13 +147,13 @@ void print_devices() {
 
 void add_time_options(CLI::App& command, RenderOptions& options) {
   auto* time = command.add_option("--time", options.time, "Moment of the animation (s, default 0)");
-  time->type_name("SECONDS");
+  time->type_name("SECONDS")->check(not_empty());
   auto* frames =
       command.add_option("--frames", options.frames,
                          "Render frames A to B, every S-th: A, A-B or A-BxS; frame f shows the time f / fps "
                          "and its number goes into the file name: out.####.exr, out_%04d.exr, or before "
                          "the extension");
-  frames->type_name("A-BxS")->excludes(time);
+  frames->type_name("A-BxS")->check(not_empty())->excludes(time);
   command.add_option("--fps", options.fps, "Frames a second of --frames (default 24)")
       ->type_name("N")
       ->needs(frames);
@@ -155,12 +175,8 @@ void add_render_command(CLI::App& app) {
       ->group("View");
   command->add_option("--device", options->device, "Where to render, one of `list devices` (default cpu)");
   command->add_flag_callback("--list-devices", print_devices, "List devices and exit");
-  command->add_flag("--stats", options->stats,
-                    "Print times and rays of passes, times and sizes of structures");
-  command
-      ->add_option("--progress", options->progress,
-                   "auto, bar, plain, json or none (default auto: a bar on a terminal)")
-      ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}));
+  add_stats_option(*command, options->stats);
+  add_progress_option(*command, options->progress);
   options->log = add_log_options(*command);
   command->callback([options] { run(*options); });
 }

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "base/atomic_file.h"
+#include "checks.h"
 #include "commands.h"
 #include "logging.h"
 #include "output.h"
@@ -84,6 +85,7 @@ void check_pixels(const RerunOptions& options, const Image& old, const Image& im
 void run(const RerunOptions& options) {
   start_logging(*options.log);
   if (!options.check && options.output->files.empty()) throw CLI::RequiredError("-o,--output or --check");
+  require_distinct(options.output->files);
   for (const std::string& file : options.output->files) require_writable(file);
   const Image old = read_image(options.image);
   const Receipt receipt = read_receipt(old.metadata, options.image);
@@ -121,18 +123,15 @@ void add_rerun_command(CLI::App& app) {
   options->output = add_output_options(*command);
   command->add_flag("--check", options->check,
                     "Compare every value with the image; exit status 1 when any differs");
-  command->add_option("--scene", options->scene, "Scene file, when it is no longer where the receipt says");
+  command->add_option("--scene", options->scene, "Scene file, when it is no longer where the receipt says")
+      ->check(not_empty());
   command
       ->add_option("-t,--threads,--nthreads", options->threads,
                    "Worker threads (default as the receipt says)")
       ->check(CLI::Range(0, 1024));
   command->add_flag("--force", options->force, "Render although the scene has changed");
-  command->add_flag("--stats", options->stats,
-                    "Print times and rays of passes, times and sizes of structures");
-  command
-      ->add_option("--progress", options->progress,
-                   "auto, bar, plain, json or none (default auto: a bar on a terminal)")
-      ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}));
+  add_stats_option(*command, options->stats);
+  add_progress_option(*command, options->progress);
   options->log = add_log_options(*command);
   command->callback([options] { run(*options); });
 }

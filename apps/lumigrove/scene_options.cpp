@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "checks.h"
 #include "lumigrove/scene.h"
 
 namespace lumigrove {
@@ -34,6 +35,7 @@ std::shared_ptr<SceneOptions> add_scene_options(CLI::App& command) {
   command
       .add_option("--environment", options->environment,
                   "Light from infinitely far away: constant radiance r,g,b or an equirectangular image")
+      ->check(not_empty())
       ->type_name("R,G,B|FILE");
   return options;
 }

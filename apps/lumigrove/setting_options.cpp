@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "checks.h"
 #include "frame/value_text.h"
 
 namespace lumigrove {
@@ -140,6 +141,7 @@ CLI::Option* add_list_option(CLI::App& command, const std::string& name, int cou
 std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command) {
   auto options = std::make_shared<SettingOptions>();
   command.add_option("--preset,--method", options->preset, "Method, one of `list methods` (default tree)")
+      ->check(not_empty())
       ->type_name("NAME")
       ->group(kGroup);
   command.add_option("--settings", options->files, "Read settings from a TOML file; may be repeated")

@@ -38,6 +38,10 @@ std::string structure_line(const StructureStats& s, std::uint64_t lights) {
 
 }  // namespace
 
+void add_stats_option(CLI::App& command, bool& stats) {
+  command.add_flag("--stats", stats, "Print times and rays of passes, times and sizes of structures");
+}
+
 void accumulate(RenderStats& total, const RenderStats& frame) {
   total.spp_done = frame.spp_done;
   total.total_ms += frame.total_ms;

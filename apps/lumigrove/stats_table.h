@@ -1,11 +1,15 @@
 // The --stats table.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <string>
 
 #include "lumigrove/renderer.h"
 
 namespace lumigrove {
+
+// --stats
+void add_stats_option(CLI::App& command, bool& stats);
 
 // Adds times and rays of `frame`; sizes and counts become those of `frame`.
 void accumulate(RenderStats& total, const RenderStats& frame);

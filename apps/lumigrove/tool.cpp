@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <new>
 #include <string_view>
@@ -61,13 +63,23 @@ std::string unexpected_sentence(const CLI::App& command, const std::vector<std::
                      nearest(name, words_of(command, kind)));
 }
 
+// CLI11's own words, but for an option with too few values.
+std::string usage_sentence(const CLI::App& command, const CLI::ParseError& error) {
+  const std::string words = error.what();
+  if (!dynamic_cast<const CLI::ArgumentMismatch*>(&error)) return words;
+  const CLI::Option* option = command.get_option_no_throw(words.substr(0, words.find(':')));
+  return option ? fmt::format("{} must be followed by {}", option->get_name(), option->get_type_name())
+                : words;
+}
+
 int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
   const CLI::App* command = parsed_command(&app);
   const std::vector<std::string> unexpected = app.remaining(true);
   const bool misspelt = !unexpected.empty() && (dynamic_cast<const CLI::ExtrasError*>(&error) ||
                                                 dynamic_cast<const CLI::RequiredError*>(&error));
-  const std::string sentence = misspelt ? unexpected_sentence(*command, unexpected) : error.what();
+  const std::string sentence =
+      misspelt ? unexpected_sentence(*command, unexpected) : usage_sentence(*command, error);
   return fail(kWrongUsage, fmt::format("{} (see `{} --help`)", sentence, full_name(command)));
 }
 
@@ -92,6 +104,8 @@ int parse_and_run(int argc, char** argv) {
   } catch (const ExitCode& code) {
     return code.status;
   }
+  if (std::fflush(stdout) != 0 || std::ferror(stdout))
+    throw Error(fmt::format("standard output cannot be written: {}", std::strerror(errno)));
   return 0;
 }
 

@@ -11,6 +11,7 @@
 
 #include "base/atomic_file.h"
 #include "base/srgb.h"
+#include "image/png_check.h"
 #include "lumigrove/image.h"
 
 namespace lumigrove {
@@ -25,10 +26,15 @@ constexpr std::int64_t kMostValues = std::int64_t{1} << 29;  // of an image in a
 
 enum class Format { kExr, kPng, kJpeg };
 
-Format format_of(const fs::path& file) {
+std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+Format format_of(const fs::path& file) {
+  const std::string extension = lower_extension(file);
   if (extension == ".exr") return Format::kExr;
   if (extension == ".png") return Format::kPng;
   if (extension == ".jpg" || extension == ".jpeg") return Format::kJpeg;
@@ -322,6 +328,13 @@ bool holds_srgb(const OIIO::ImageSpec& spec) {
   return integer && spec.get_string_attribute("oiio:ColorSpace") != "Linear";
 }
 
+// Before libpng complains in its own words.
+void check_png(const fs::path& file) {
+  std::vector<unsigned char> bytes(static_cast<std::size_t>(fs::file_size(file)));
+  OIIO::Filesystem::read_bytes(file.string(), bytes.data(), bytes.size());
+  if (const std::string damage = png_damage(bytes); !damage.empty()) fail_read(file, damage);
+}
+
 void read_metadata(const OIIO::ImageSpec& spec, Image& image) {
   for (const OIIO::ParamValue& attribute : spec.extra_attribs) {
     const std::string name = attribute.name().string();
@@ -361,6 +374,7 @@ Image read_image(const fs::path& file) {
   std::error_code error;
   if (!fs::exists(file, error)) fail_read(file, "there is no such file");
   if (!fs::is_regular_file(file, error)) fail_read(file, "it is not a regular file");
+  if (lower_extension(file) == ".png") check_png(file);
   OIIO::ImageSpec options;
   options.attribute("oiio:UnassociatedAlpha", 1);
   const auto input = OIIO::ImageInput::open(file.string(), &options);

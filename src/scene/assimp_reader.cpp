@@ -2,6 +2,7 @@
 
 #include <assimp/DefaultIOSystem.h>
 #include <assimp/GltfMaterial.h>
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string_view>
 
 #include "base/srgb.h"
@@ -40,6 +42,33 @@ mat4 to_mat4(const aiMatrix4x4& m) {  // Assimp stores rows
               vec4(m.a4, m.b4, m.c4, m.d4));
 }
 
+// " v .5 0 0" -> "v 0.5 0 0": Assimp 5.2 leaves out, without a word, lines that begin with a blank and vertices with a
+// number that begins with a point, so that every later index means another vertex.
+std::string as_assimp_reads(std::span<const unsigned char> obj) {
+  std::string text;
+  text.reserve(obj.size());
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
+  bool line_begins = true, in_vertex = false;
+  char before = '\n';
+  for (const unsigned char byte : obj) {
+    const char c = static_cast<char>(byte);
+    if (line_begins && is_blank(c)) continue;
+    if (line_begins) in_vertex = c == 'v';
+    line_begins = c == '\n' && before != '\\';  // else it continues
+    if (in_vertex && c == '.' && is_blank(before)) text += '0';
+    text += c;
+    if (c != '\r') before = c;
+  }
+  return text;
+}
+
+Assimp::IOStream* open_obj(const fs::path& path) {
+  const std::string text = as_assimp_reads(read_file(path));
+  auto* bytes = new std::uint8_t[text.size()];  // the stream deletes it
+  std::copy(text.begin(), text.end(), bytes);
+  return new Assimp::MemoryIOStream(bytes, text.size(), true);
+}
+
 // Files of the scene's folder, and a record of what else was asked for.
 class FolderFiles : public Assimp::DefaultIOSystem {
  public:
@@ -65,6 +94,7 @@ class FolderFiles : public Assimp::DefaultIOSystem {
       missing_.insert(name);
       return nullptr;
     }
+    if (lower_case_extension(path) == ".obj") return open_obj(path);
     return DefaultIOSystem::Open(path.c_str(), mode);
   }
 

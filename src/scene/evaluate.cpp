@@ -261,10 +261,16 @@ CameraInstance default_camera(const SceneState& state) {
   view.forward = glm::normalize(vec3(0, -0.3f, -1));
   view.right = vec3(1, 0, 0);
   view.up = glm::cross(view.right, view.forward);
-  // The bounding sphere fills the vertical field of view, with a small margin.
-  const float radius = 0.5f * state.diagonal;
-  const float distance = 1.05f * radius / std::sin(0.5f * view.camera.vertical_fov);
+  // As near as the eight corners of the bounds stay inside a square field of view, with a small margin.
   const vec3 target = state.bounds.empty() ? vec3(0) : state.bounds.centre();
+  const vec3 half = state.bounds.empty() ? vec3(0.5f) : state.bounds.hi - target;
+  const float tangent = std::tan(0.5f * view.camera.vertical_fov) / 1.05f;
+  float distance = 0.5f * state.diagonal;
+  for (int corner = 0; corner < 8; ++corner) {
+    const vec3 d = half * vec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+    const float across = std::max(std::abs(glm::dot(d, view.right)), std::abs(glm::dot(d, view.up)));
+    distance = std::max(distance, across / tangent - glm::dot(d, view.forward));
+  }
   view.position = target - distance * view.forward;
   view.camera.znear = 1e-3f * distance;
   return view;

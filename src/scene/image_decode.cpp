@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "base/srgb.h"
+#include "image/png_check.h"
 
 namespace lumigrove {
 namespace {
@@ -84,6 +85,8 @@ std::vector<T> read_rgba(OIIO::ImageInput& input, OIIO::TypeDesc type, T opaque,
 Image8or32 decode_image(std::span<const unsigned char> file, const std::string& name, bool srgb) {
   const std::string extension = extension_of(file, name);
   if (file.empty() || extension.empty()) throw Error(fmt::format("{}: not an image in a known format", name));
+  if (const std::string damage = png_damage(file); !damage.empty())
+    throw Error(fmt::format("{}: the image is damaged ({})", name, damage));
   OIIO::Filesystem::IOMemReader memory(file.data(), file.size());
   OIIO::ImageSpec config;
   config["oiio:UnassociatedAlpha"] = 1;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <regex>
 
 #include "lumigrove/image.h"
@@ -59,6 +60,8 @@ void set_environment(Scene& scene, const std::string& text) {
   if (is_colour(text)) {
     environment.radiance = parse_radiance(text);
   } else {
+    if (std::error_code error; !std::filesystem::exists(text, error))
+      throw Error(fmt::format("environment '{}' is neither three numbers r,g,b nor a file", text));
     scene.images.push_back(load_environment_image(text));
     environment.radiance = vec3(1);
     environment.image = static_cast<int>(scene.images.size()) - 1;
