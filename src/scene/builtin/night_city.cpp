@@ -20,6 +20,7 @@ namespace {
 constexpr float kLot = 56, kStreet = 16, kPitch = kLot + kStreet;  // metres
 constexpr float kHalfRoad = 5.2f, kCurb = 0.15f;
 constexpr float kPeriod = 8;        // seconds
+constexpr float kBrightness = 2;    // of all lights together; their figures are relative to one another
 constexpr vec3 kBlackMetal(0.02f);  // what stands right beside lights
 constexpr float kBulbShare = 0.22f, kNeonShare = 0.12f, kLampShare = 0.04f, kLanternShare = 0.3f;
 constexpr std::size_t kMostLamps = 3000;
@@ -180,9 +181,9 @@ void add_buildings(City& city) {
 
 // The last two are for shops.
 constexpr std::array<vec3, 9> kWindowRadiance = {
-    vec3(1.1f, 0.62f, 0.22f), vec3(0.62f, 0.33f, 0.11f), vec3(1.2f, 0.77f, 0.35f),
-    vec3(0.6f, 0.57f, 0.5f),  vec3(0.35f, 0.19f, 0.06f), vec3(0.11f, 0.24f, 0.55f),
-    vec3(0.5f, 0.23f, 0.07f), vec3(2.4f, 1.5f, 0.6f),    vec3(1.3f, 1.5f, 1.7f)};
+    vec3(0.65f, 0.39f, 0.16f),  vec3(0.39f, 0.23f, 0.091f), vec3(0.72f, 0.49f, 0.25f),
+    vec3(0.39f, 0.39f, 0.36f),  vec3(0.23f, 0.13f, 0.052f), vec3(0.078f, 0.16f, 0.36f),
+    vec3(0.33f, 0.16f, 0.052f), vec3(0.85f, 0.59f, 0.27f),  vec3(0.52f, 0.59f, 0.65f)};
 
 // Lights windows of together about `triangles`; panes are cut finer when there are too few.
 void add_windows(City& city, std::size_t triangles) {
@@ -236,7 +237,7 @@ LampModel add_lamp_model(Scene& scene) {
                      0.17f * sine(kPi * static_cast<float>(k) / 4));
   builder.polygon(rim);
   model.lens_triangles = builder.triangle_count();
-  model.lens = add_mesh(scene, builder, "lamp lens", add_emitter(scene, "lamp lens", vec3(340, 230, 112)));
+  model.lens = add_mesh(scene, builder, "lamp lens", add_emitter(scene, "lamp lens", vec3(150, 97, 45)));
   return model;
 }
 
@@ -268,7 +269,7 @@ void add_lamps(City& city, std::size_t triangles) {
 // Small globes on brackets along every street wall: pools of light a few metres wide.
 void add_wall_lanterns(City& city, std::size_t triangles, int subdivisions) {
   constexpr float kHeight = 2.9f, kReach = 0.75f, kRadius = 0.11f;
-  constexpr std::array<vec3, 3> kGlow = {vec3(75, 46, 19), vec3(75, 36, 11), vec3(60, 54, 42)};
+  constexpr std::array<vec3, 3> kGlow = {vec3(30, 19, 8), vec3(30, 14, 4), vec3(24, 22, 17)};
   MeshBuilder brackets;
   std::array<MeshBuilder, kGlow.size()> globes;
   float length = 0;
@@ -300,8 +301,8 @@ void add_wall_lanterns(City& city, std::size_t triangles, int subdivisions) {
 // --- strings of bulbs
 // -----------------------------------------------------------------------------------------
 
-constexpr std::array<vec3, 6> kBulbRadiance = {vec3(62, 32, 6.4f), vec3(64, 2, 1.2f),  vec3(2.4f, 52, 4),
-                                               vec3(2, 8.8f, 88),  vec3(58, 2.4f, 46), vec3(58, 38, 2)};
+constexpr std::array<vec3, 6> kBulbRadiance = {vec3(31, 16, 3.2f), vec3(32, 1, 0.61f), vec3(1.2f, 26, 2),
+                                               vec3(1, 4.4f, 44),  vec3(29, 1.2f, 23), vec3(29, 19, 1)};
 constexpr int kBulbsPerColor = 6, kBulbsPerString = 3 * kBulbsPerColor;
 constexpr float kBulbRadius = 0.13f;
 constexpr float kMainStreetShare = 0.3f;  // of strings and signs
@@ -386,8 +387,8 @@ void add_strings(City& city, std::size_t triangles, int subdivisions) {
 // --- neon signs
 // -----------------------------------------------------------------------------------------------
 
-constexpr std::array<vec3, 6> kNeonRadiance = {vec3(62, 1.4f, 3.2f), vec3(1.4f, 11, 74), vec3(1.1f, 51, 13),
-                                               vec3(57, 1.9f, 46),   vec3(62, 17, 0.9f), vec3(1.8f, 42, 51)};
+constexpr std::array<vec3, 6> kNeonRadiance = {vec3(46, 1, 2.4f),  vec3(1, 8.4f, 55),   vec3(0.84f, 38, 10),
+                                               vec3(42, 1.4f, 34), vec3(46, 13, 0.63f), vec3(1.3f, 31, 38)};
 constexpr std::array<std::string_view, 14> kWords = {"HOTEL",   "CAFE",  "BAR",     "JAZZ",  "OPEN",
                                                      "CINEMA",  "CLUB",  "NOODLES", "PIZZA", "DANCE",
                                                      "KARAOKE", "BOOKS", "TAXI",    "LUX"};
@@ -603,6 +604,11 @@ void add_kites(City& city) {
   }
 }
 
+void brighten(Scene& scene) {
+  for (Material& material : scene.materials) material.emission *= kBrightness;
+  for (PunctualLight& light : scene.lights) light.color *= kBrightness;
+}
+
 Scene make(const Parameters& parameters) {
   City city;
   city.plan = {parameters.integer("blocks"), parameters.seed()};
@@ -619,6 +625,7 @@ Scene make(const Parameters& parameters) {
   add_strings(city, share(kBulbShare), subdivisions);
   add_signs(city, share(kNeonShare));
   add_windows(city, lights > city.emissive ? lights - city.emissive : 0);
+  brighten(city.scene);
   const float z = city.plan.camera_z();
   add_camera(city.scene, "street", vec3(0.3f, 2.5f, z), vec3(-0.5f, 5.2f, z - 40), 52);
   add_camera(city.scene, "roofs", vec3(3, 62, z + 60), vec3(0, 0, z - 50), 50);
