@@ -233,6 +233,18 @@ TEST(GltfExport, RoundTripKeepsEveryBit) {
   }
 }
 
+TEST(GltfExport, MeshSharedByTwoGroupsStaysOne) {
+  Scene scene;
+  scene.materials.resize(1);
+  scene.meshes = {test_triangle("rod", 0, 0), test_triangle("brackets", 0, 1)};
+  scene.nodes.resize(2);
+  scene.nodes[0].meshes = {0};
+  scene.nodes[1].meshes = {0, 1};
+  const Scene back = round_trip(scene);
+  EXPECT_EQ(back.meshes.size(), 2u);
+  EXPECT_EQ(content_hash(back), content_hash(scene));
+}
+
 TEST(GltfExport, SameSceneGivesSameBytes) {
   const TempFolder folder;
   const Scene scene = rich_scene();
@@ -355,6 +367,7 @@ TEST(GltfExport, BuiltinScenesSurvive) {
     expect_same_picture(scene, once, 0);
     expect_same_picture(scene, once, 0.7);
     EXPECT_EQ(once.cameras.size(), scene.cameras.size());
+    EXPECT_EQ(content_hash(once), content_hash(scene));
     EXPECT_EQ(content_hash(once), content_hash(twice));
   }
 }

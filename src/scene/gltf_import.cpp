@@ -1,5 +1,5 @@
-// glTF 2.0 -> Scene. Every triangle primitive of a mesh becomes one Mesh; nodes that show the same glTF mesh
-// share them. Only what the default scene reaches is kept (the first scene without a default, all root nodes
+// glTF 2.0 -> Scene. Every triangle primitive becomes one Mesh; nodes that show the same glTF mesh, and glTF
+// meshes that list the same primitive (the same accessors and material), share them. Only what the default scene reaches is kept (the first scene without a default, all root nodes
 // without scenes).
 //
 // Where glTF leaves a choice or Lumigrove knows less: alphaMode BLEND is cut out at alpha 0.5; occlusion
@@ -12,6 +12,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <tuple>
 
 #include "base/vec.h"
 #include "device/device.h"
@@ -100,6 +101,9 @@ std::vector<uvec3> assemble_triangles(int mode, std::size_t count,
   }
   return triangles;
 }
+
+// What makes two primitives the same geometry: attributes, indices, material, mode.
+using PrimitiveKey = std::tuple<std::map<std::string, int>, int, int, int>;
 
 class Importer {
  public:
@@ -257,12 +261,21 @@ class Importer {
       const tinygltf::Mesh& source = file_.model.meshes[static_cast<std::size_t>(index)];
       const std::string user = label("mesh", static_cast<std::size_t>(index), source.name);
       for (const tinygltf::Primitive& primitive : source.primitives)
-        if (std::optional<Mesh> mesh = import_primitive(primitive, user)) {
-          mesh->name = source.name;
-          parts.push_back(static_cast<int>(scene_.meshes.size()));
-          scene_.meshes.push_back(std::move(*mesh));
-        }
+        if (const int mesh = add_primitive(primitive, source.name, user); mesh != -1) parts.push_back(mesh);
     }
+  }
+
+  // The scene mesh of a primitive, imported the first time it is met; -1 for points and lines.
+  int add_primitive(const tinygltf::Primitive& source, const std::string& name, const std::string& user) {
+    const auto [at, is_new] =
+        primitives_.try_emplace({source.attributes, source.indices, source.material, source.mode}, -1);
+    if (!is_new) return at->second;
+    if (std::optional<Mesh> mesh = import_primitive(source, user)) {
+      mesh->name = name;
+      at->second = static_cast<int>(scene_.meshes.size());
+      scene_.meshes.push_back(std::move(*mesh));
+    }
+    return at->second;
   }
 
   std::optional<Mesh> import_primitive(const tinygltf::Primitive& source, const std::string& user) {
@@ -494,6 +507,7 @@ class Importer {
   Scene scene_;
   std::map<std::pair<int, bool>, int> images_;  // glTF image and sRGB? -> scene image
   std::map<int, std::vector<int>> meshes_;      // glTF mesh -> scene meshes
+  std::map<PrimitiveKey, int> primitives_;      // -> scene mesh or -1
   std::vector<int> cameras_;                    // glTF camera -> scene camera or -1
   std::vector<int> nodes_;                      // glTF node -> scene node or -1
   int default_material_ = -1;

@@ -256,7 +256,7 @@ void add_sun(Scene& scene, float elevation_degrees) {
   PunctualLight sun;
   sun.name = "sun";
   sun.type = LightType::kDirectional;
-  sun.color = vec3(16, 14.4f, 12);
+  sun.color = vec3(11, 9.7f, 7.9f);
   const auto towards = [=](float azimuth) {
     const float elevation = elevation_degrees * kPi / 180;
     return vec3(cosine(elevation) * cosine(azimuth), sine(elevation), cosine(elevation) * sine(azimuth));
@@ -276,7 +276,7 @@ Scene make(const Parameters& parameters) {
   add_drapes(scene, bays, parameters.seed());
   add_sun(scene, parameters.real("sun"));
   const float end = 0.5f * kBay * static_cast<float>(bays);
-  add_camera(scene, "court", vec3(-end + 1.2f, 2.3f, 2.6f), vec3(end, 3.6f, -2.5f), 58);
+  add_camera(scene, "court", vec3(-end + 1.2f, 2.3f, 2.6f), vec3(end, 2.9f, -2.5f), 54);
   add_camera(scene, "gallery", vec3(-end + 1.5f, kUpperFloor + 1.7f, kHalfCourt + 2),
              vec3(end * 0.4f, 3.2f, -kHalfCourt), 55);
   return scene;

@@ -13,7 +13,7 @@ namespace lumigrove::builtin {
 namespace {
 
 constexpr float kHalfWidth = 60;     // metres; the land is a square
-constexpr float kTotalFlux = 20000;  // W, all fireflies together
+constexpr float kTotalFlux = 36000;  // W, all fireflies together
 constexpr float kRadiance = 300;  // W/(sr m^2) of a luminous triangle, while that keeps it under kLargestEdge
 constexpr float kLargestEdge = 0.3f;  // metres
 constexpr float kPeriod = 10;         // seconds

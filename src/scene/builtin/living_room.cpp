@@ -1,5 +1,6 @@
 // `living-room`: a furnished room at night whose lamps all hide behind shades, so that most light arrives
-// indirectly, over a polished wooden floor that mirrors it. The pendant swings a little.
+// indirectly, over a polished wooden floor that mirrors it. Cloth shades glow, since nothing here lets light
+// through. The pendant swings a little.
 #include <array>
 #include <cmath>
 #include <string>
@@ -53,10 +54,10 @@ Materials add_materials(Scene& scene, std::uint32_t seed) {
   m.dark_wood = add_surface(scene, "walnut", vec3(0.20f, 0.11f, 0.065f), 0.35f);
   m.fabric = add_surface(scene, "sofa fabric", vec3(0.52f, 0.49f, 0.44f));
   m.cushion = add_surface(scene, "cushion", vec3(0.66f, 0.30f, 0.10f));
-  m.metal = add_surface(scene, "steel", vec3(0.78f, 0.78f, 0.8f), 0.22f, 1);
+  m.metal = add_surface(scene, "steel", vec3(0.78f, 0.78f, 0.8f), 0.3f, 1);
   m.brass = add_surface(scene, "brass", vec3(0.85f, 0.62f, 0.28f), 0.3f, 1);
   m.white = add_surface(scene, "white paint", vec3(0.8f), 0.5f);
-  m.shade = add_surface(scene, "lamp shade", vec3(0.82f, 0.74f, 0.6f));
+  m.shade = add_emitter(scene, "lamp shade", vec3(5.4f, 3.1f, 1.2f), vec3(0.25f, 0.21f, 0.16f));
   scene.materials[m.shade].double_sided = true;
   return m;
 }
@@ -154,8 +155,8 @@ void add_floor_lamp(Scene& scene, const Materials& m, vec3 at) {
   builder.cylinder(vec3(0, 0.03f, 0), vec3(0, 1.5f, 0), 0.014f, 0.014f, 12);
   const int stand = add_mesh(scene, builder, "floor lamp stand", m.brass);
   add_node(scene, "floor lamp", {stand}, at);
-  add_node(scene, "floor lamp shade", {add_shade(scene, m, 0.25f, 0.16f, 0.34f)}, at + vec3(0, 1.42f, 0));
-  add_node(scene, "floor lamp bulb", {add_bulb(scene, "floor lamp bulb", 0.075f, 90, kWarm)},
+  add_node(scene, "floor lamp shade", {add_shade(scene, m, 0.3f, 0.2f, 0.36f)}, at + vec3(0, 1.42f, 0));
+  add_node(scene, "floor lamp bulb", {add_bulb(scene, "floor lamp bulb", 0.11f, 38, kWarm)},
            at + vec3(0, 1.58f, 0));
 }
 
@@ -166,8 +167,8 @@ void add_table_lamps(Scene& scene, const Materials& m, std::span<const vec3> pla
   builder.lathe(vec3(0), foot, 32, true);
   const int ceramic = add_mesh(scene, builder, "table lamp foot",
                                add_surface(scene, "ceramic", vec3(0.1f, 0.25f, 0.42f), 0.25f));
-  const int shade = add_shade(scene, m, 0.17f, 0.11f, 0.22f);
-  const int bulb = add_bulb(scene, "table lamp bulb", 0.055f, 40, kWarm);
+  const int shade = add_shade(scene, m, 0.21f, 0.14f, 0.24f);
+  const int bulb = add_bulb(scene, "table lamp bulb", 0.08f, 16, kWarm);
   for (const vec3 at : places) {
     add_node(scene, "table lamp", {ceramic}, at);
     add_node(scene, "table lamp shade", {shade}, at + vec3(0, 0.36f, 0));
@@ -184,15 +185,15 @@ void add_pendant(Scene& scene, const Materials& m, vec3 hook) {
   std::array<vec2, 9> dome;
   for (int k = 0; k < 9; ++k) {
     const float angle = 0.5f * kPi * static_cast<float>(k) / 8;
-    dome[k] = vec2(k == 8 ? 0.0f : 0.24f * cosine(angle), -cord - 0.2f + 0.2f * sine(angle));
+    dome[k] = vec2(k == 8 ? 0.0f : 0.3f * cosine(angle), -cord - 0.24f + 0.24f * sine(angle));
   }
   builder.lathe(vec3(0), dome, 40, true);
-  const int copper = add_surface(scene, "copper", vec3(0.9f, 0.5f, 0.32f), 0.25f, 1);
+  const int copper = add_surface(scene, "copper", vec3(0.9f, 0.5f, 0.32f), 0.45f, 1);
   scene.materials[copper].double_sided = true;
   const int shade = add_mesh(scene, builder, "pendant dome", copper);
   const int pivot = add_node(scene, "pendant", {wire, shade}, hook);
-  add_node(scene, "pendant bulb", {add_bulb(scene, "pendant bulb", 0.07f, 60, kWarm)},
-           vec3(0, -cord - 0.12f, 0), vec4(0, 0, 0, 1), pivot);
+  add_node(scene, "pendant bulb", {add_bulb(scene, "pendant bulb", 0.1f, 32, kWarm)},
+           vec3(0, -cord - 0.15f, 0), vec4(0, 0, 0, 1), pivot);
   animate_rotation(scene, pivot, kPeriod, 12, Interpolation::kCubicSpline,
                    [](float t) { return axis_angle(vec3(0, 0, 1), 0.06f * sine(2 * kPi * 2 * t)); });
 }
@@ -200,11 +201,14 @@ void add_pendant(Scene& scene, const Materials& m, vec3 hook) {
 // Half bowls on the wall that throw their light upwards.
 void add_sconces(Scene& scene, const Materials& m, std::span<const vec3> places) {
   MeshBuilder builder;
-  const vec2 bowl[] = {{0.03f, 0}, {0.1f, 0.03f}, {0.13f, 0.09f}, {0.14f, 0.16f}};
+  const vec2 bowl[] = {{0.02f, 0}, {0.12f, 0.03f}, {0.17f, 0.1f}, {0.19f, 0.19f}};
   builder.lathe(vec3(0), bowl, 32, true);
   const int shade = add_mesh(scene, builder, "sconce", m.shade);
-  const int bulb = add_bulb(scene, "sconce bulb", 0.05f, 35, kWarm);
-  for (const vec3 at : places) add_node(scene, "sconce", {shade, bulb}, at);
+  const int bulb = add_bulb(scene, "sconce bulb", 0.055f, 12, kWarm);
+  for (const vec3 at : places) {
+    add_node(scene, "sconce", {shade}, at);
+    add_node(scene, "sconce bulb", {bulb}, at + vec3(0, 0.1f, 0));
+  }
 }
 
 // --- furniture
@@ -424,7 +428,7 @@ Scene make(const Parameters& parameters) {
   add_table_lamps(scene, m, lamps);
   add_floor_lamp(scene, m, vec3(-2.75f, 0, -0.3f));
   add_pendant(scene, m, vec3(-0.45f, kHeight, -0.45f));
-  const vec3 sconces[] = {{-kHalfWidth + 0.16f, 1.75f, 1.9f}, {kHalfWidth - 0.16f, 1.75f, 0.9f}};
+  const vec3 sconces[] = {{-kHalfWidth + 0.22f, 1.75f, 1.9f}, {kHalfWidth - 0.22f, 1.75f, 0.9f}};
   add_sconces(scene, m, sconces);
   add_picture(scene, m, vec3(-1.15f, 1.65f, -kHalfDepth), vec2(0.75f, 0.55f), seed * 16 + 1);
   add_picture(scene, m, vec3(-0.2f, 1.65f, -kHalfDepth), vec2(0.5f, 0.65f), seed * 16 + 2);

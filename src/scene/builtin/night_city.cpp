@@ -20,6 +20,7 @@ namespace {
 constexpr float kLot = 56, kStreet = 16, kPitch = kLot + kStreet;  // metres
 constexpr float kHalfRoad = 5.2f, kCurb = 0.15f;
 constexpr float kPeriod = 8;        // seconds
+constexpr float kBrightness = 2;    // of all lights together; their figures are relative to one another
 constexpr vec3 kBlackMetal(0.02f);  // what stands right beside lights
 constexpr float kBulbShare = 0.22f, kNeonShare = 0.12f, kLampShare = 0.04f, kLanternShare = 0.3f;
 constexpr std::size_t kMostLamps = 3000;
@@ -58,7 +59,7 @@ int add_asphalt(Scene& scene, std::uint32_t seed) {
   const auto grain = [=](vec2 p) { return tiling_noise(p, 90, 1, seed ^ 0x1234u); };
   const int material = add_surface(scene, "wet asphalt", vec3(1));
   const int color = add_color_image(scene, "asphalt", kSize, [&](vec2 p) {
-    return glm::mix(0.14f + 0.12f * grain(p), 0.09f + 0.02f * grain(p), puddle(p)) * vec3(1, 1, 1.06f);
+    return glm::mix(0.19f + 0.14f * grain(p), 0.11f + 0.03f * grain(p), puddle(p)) * vec3(1, 1, 1.06f);
   });
   const int roughness = add_roughness_image(scene, "asphalt roughness", kSize, [&](vec2 p) {
     return glm::mix(0.62f + 0.2f * grain(p), 0.4f, puddle(p));
@@ -81,7 +82,7 @@ void add_ground(City& city) {
       builder.box(vec3(city.plan.line(i) + kHalfRoad, 0, city.plan.line(j) + kHalfRoad),
                   vec3(city.plan.line(i + 1) - kHalfRoad, kCurb, city.plan.line(j + 1) - kHalfRoad),
                   kSides | kTop);
-  add_static(scene, builder, "pavement", add_surface(scene, "pavement", vec3(0.34f, 0.33f, 0.31f), 0.7f));
+  add_static(scene, builder, "pavement", add_surface(scene, "pavement", vec3(0.42f, 0.41f, 0.38f), 0.7f));
 }
 
 // Dashes along the middle of every street and zebra crossings, a centimetre above the road.
@@ -603,6 +604,11 @@ void add_kites(City& city) {
   }
 }
 
+void brighten(Scene& scene) {
+  for (Material& material : scene.materials) material.emission *= kBrightness;
+  for (PunctualLight& light : scene.lights) light.color *= kBrightness;
+}
+
 Scene make(const Parameters& parameters) {
   City city;
   city.plan = {parameters.integer("blocks"), parameters.seed()};
@@ -619,6 +625,7 @@ Scene make(const Parameters& parameters) {
   add_strings(city, share(kBulbShare), subdivisions);
   add_signs(city, share(kNeonShare));
   add_windows(city, lights > city.emissive ? lights - city.emissive : 0);
+  brighten(city.scene);
   const float z = city.plan.camera_z();
   add_camera(city.scene, "street", vec3(0.3f, 2.5f, z), vec3(-0.5f, 5.2f, z - 40), 52);
   add_camera(city.scene, "roofs", vec3(3, 62, z + 60), vec3(0, 0, z - 50), 50);

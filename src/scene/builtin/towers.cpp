@@ -1,6 +1,7 @@
 // `towers`: city towers seen from above, lit by their windows alone; after the character of the "Arnold
 // Buildings" of Lin & Yuksel (I3D 2020): about 4,600 emissive triangles of radiance 4, albedo 0.8, a camera
-// that looks down 40 degrees into the street canyons, and a second one that circles.
+// that looks down 40 degrees into the street canyons, and a second one that circles. A row of low buildings at
+// the camera's feet lights the nearest facades.
 #include <array>
 #include <string>
 
@@ -18,15 +19,15 @@ constexpr float kPeriod = 24;  // seconds, once around
 enum Purpose : std::uint32_t { kShape, kTint };
 
 // Luminance about 4: warm, neutral, cool.
-constexpr std::array<vec3, 3> kRadiance = {vec3(5.2f, 3.8f, 2.3f), vec3(4.2f, 4.0f, 3.6f),
-                                           vec3(3.3f, 4.1f, 5.0f)};
+constexpr std::array<vec3, 3> kRadiance = {vec3(7.4f, 3.3f, 0.6f), vec3(6.0f, 3.7f, 1.6f),
+                                           vec3(2.6f, 4.1f, 7.0f)};
 
-BuildingShape tower(RandomStream& random, vec2 centre) {
+BuildingShape tower(RandomStream& random, vec2 centre, int least_floors, int more_floors) {
   const vec2 half(random.uniform(7.5f, 10), random.uniform(7.5f, 10));
   BuildingShape shape;
   shape.lo = centre - half;
   shape.hi = centre + half;
-  shape.floors = 7 + random.integer(13);
+  shape.floors = least_floors + random.integer(more_floors);
   shape.ground_floor = 5;
   shape.floor_height = 3.6f;
   shape.bay = random.uniform(3.2f, 4.4f);
@@ -85,12 +86,12 @@ Scene make(const Parameters& parameters) {
   add_static(scene, builder, "ground", add_surface(scene, "ground", vec3(0.8f)));
   std::vector<WindowSlot> windows;
   std::vector<Facade> facades;
-  for (int j = 0; j < kRows; ++j)
+  for (int j = -1; j < kRows; ++j)
     for (int i = 0; i < kColumns; ++i) {
       RandomStream random(seed, kShape, static_cast<std::uint32_t>(j * kColumns + i));
       const vec2 centre((static_cast<float>(i) - 0.5f * (kColumns - 1) + 0.7f) * kPitch,
                         static_cast<float>(j) * kPitch);
-      const BuildingShape shape = tower(random, centre);
+      const BuildingShape shape = j < 0 ? tower(random, centre, 6, 4) : tower(random, centre, 7, 13);
       add_building(shape, builder, windows, facades);
       add_crown(shape, random, builder);
     }
