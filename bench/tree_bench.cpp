@@ -45,7 +45,8 @@ struct SurfaceBatch {
     std::vector<Ray> rays(n);
     std::vector<Hit> hits(n);
     std::vector<Surface> all(n);
-    launch(window.count(), CameraKernel{camera, window, rays, 0, 0, true});
+    std::vector<std::uint32_t> numbers(n);
+    launch(window.count(), CameraKernel{camera, window, rays, numbers, 0, 0, true});
     world->tracer.closest(rays, hits, Coherence::kCoherent);
     launch(window.count(), SurfaceKernel{world->arrays.view(), rays, hits, all});
     for (const Surface& surface : all) {
@@ -63,7 +64,7 @@ struct SurfaceBatch {
     launch(walk_batches(static_cast<int>(surfaces.size())),
            DirectLightKernel{direct.sampler, direct.rng, kDimLight, 1.0f, false, surfaces, pixels, shadow,
                              contribution},
-           4);
+           kLaunchGrain / kWalkBatch);
   }
 };
 

@@ -49,12 +49,10 @@ class PathBatch {
     std::vector<Hit> hits(n);
     std::vector<Surface> surfaces(n);
     std::vector<std::uint32_t> pixels(n);
-    launch(window.count(), CameraKernel{camera, window, rays, lighting.rng.seed, lighting.rng.frame, false});
+    launch(window.count(), CameraKernel{camera, window, rays, pixels, lighting.rng.seed, lighting.rng.frame, false});
     world_->tracer.closest(rays, hits, Coherence::kCoherent);
     launch(window.count(),
            SurfaceKernel{world_->arrays.view(), rays, hits, surfaces, settings_.force_diffuse});
-    for (std::size_t i = 0; i < n; ++i)
-      pixels[i] = rng_pixel(camera, pixel_of_index(window, static_cast<int>(i)));
 
     Light light{std::vector<vec3>(n, vec3(0)), std::vector<vec3>(n, vec3(0))};
     PathTracing tracing;

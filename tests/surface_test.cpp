@@ -350,15 +350,16 @@ TEST(Camera, CropWindowShowsTheSamePixels) {
   const PixelWindow whole{0, 0, 64, 48}, crop{10, 20, 31, 29};
   std::vector<Ray> rays(static_cast<std::size_t>(whole.count())),
       cropped(static_cast<std::size_t>(crop.count()));
-  launch(whole.count(), CameraKernel{view, whole, rays, 7, 2, true});
-  launch(crop.count(), CameraKernel{view, crop, cropped, 7, 2, true});
+  std::vector<std::uint32_t> pixels(rays.size()), cropped_pixels(cropped.size());
+  launch(whole.count(), CameraKernel{view, whole, rays, pixels, 7, 2, true});
+  launch(crop.count(), CameraKernel{view, crop, cropped, cropped_pixels, 7, 2, true});
   std::vector<Ray> by_pixel(rays.size());
-  for (int i = 0; i < whole.count(); ++i) {
-    by_pixel[rng_pixel(view, pixel_of_index(whole, i))] = rays[static_cast<std::size_t>(i)];
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_EQ(pixels[i], rng_pixel(view, pixel_of_index(whole, static_cast<int>(i))));
+    by_pixel[pixels[i]] = rays[i];
   }
-  for (int i = 0; i < crop.count(); ++i) {
-    const Ray& expected = by_pixel[rng_pixel(view, pixel_of_index(crop, i))];
-    EXPECT_EQ(cropped[static_cast<std::size_t>(i)].direction, expected.direction);
+  for (std::size_t i = 0; i < cropped.size(); ++i) {
+    EXPECT_EQ(cropped[i].direction, by_pixel[cropped_pixels[i]].direction);
   }
 }
 
@@ -366,8 +367,9 @@ TEST(Camera, JitterStaysInsideThePixel) {
   const CameraView view = make_camera_view(CameraInstance{}, 40, 30);
   const PixelWindow window{0, 0, 40, 30};
   std::vector<Ray> jittered(1200), centred(1200);
-  launch(window.count(), CameraKernel{view, window, jittered, 1, 0, true});
-  launch(window.count(), CameraKernel{view, window, centred, 1, 0, false});
+  std::vector<std::uint32_t> pixels(1200);
+  launch(window.count(), CameraKernel{view, window, jittered, pixels, 1, 0, true});
+  launch(window.count(), CameraKernel{view, window, centred, pixels, 1, 0, false});
   int moved = 0;
   for (std::size_t i = 0; i < jittered.size(); ++i) {
     const vec3 a = jittered[i].direction / -jittered[i].direction.z,

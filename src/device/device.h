@@ -9,8 +9,8 @@
 
 namespace lumigrove {
 
-// Indices of one task; small enough to balance, large enough to hide the scheduler.
-inline constexpr int kLaunchGrain = 256;
+// Indices of one task: a tile of an image is one, so that its steps stay on one thread and in that core's cache.
+inline constexpr int kLaunchGrain = 4096;
 
 // kernel(i) for i in [0, count).
 template <class Kernel>

@@ -92,9 +92,7 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
     b.direct.assign(n, vec3(0));
     b.indirect.assign(n, vec3(0));
     b.emission.resize(n);
-    for (int i = 0; i < count; ++i)
-      b.pixels[static_cast<std::size_t>(i)] = rng_pixel(camera, pixel_of_index(tile, i));
-    launch(count, CameraKernel{camera, tile, b.rays, direct.rng.seed, direct.rng.frame, settings.jitter});
+    launch(count, CameraKernel{camera, tile, b.rays, b.pixels, direct.rng.seed, direct.rng.frame, settings.jitter});
   });
   timed(b.primary_ms, [&] {
     b.hits.resize(n);

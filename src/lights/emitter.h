@@ -4,6 +4,7 @@
 // inverse square. Triangles are sampled uniformly by area.
 #pragma once
 
+#include "base/lanes.h"
 #include "base/vec.h"
 #include "lights/light_set.h"
 #include "scene/interpolate.h"
@@ -145,7 +146,7 @@ LUMI_HD inline bool is_cut_out(const SceneView& scene, const MeshPoint& point) {
   return is_cut_out(scene, mesh, point.triangle, point.u, point.v);
 }
 
-LUMI_HD inline EmitterPoint triangle_point(const SceneView& scene, const LightView& lights, const Emitter& e,
+LUMI_HD LUMI_ALWAYS_INLINE EmitterPoint triangle_point(const SceneView& scene, const LightView& lights, const Emitter& e,
                                            std::uint32_t index, vec3 x, vec2 u) {
   EmitterPoint p;
   const float root = glm::sqrt(u.x);  // uniform by area
@@ -173,7 +174,7 @@ LUMI_HD inline EmitterPoint triangle_point(const SceneView& scene, const LightVi
 }
 
 // `incident` is zero when nothing can arrive (back side, outside the cone or range, x on the light).
-LUMI_HD inline EmitterPoint sample_emitter_point(const SceneView& scene, const LightView& lights,
+LUMI_HD LUMI_ALWAYS_INLINE EmitterPoint sample_emitter_point(const SceneView& scene, const LightView& lights,
                                                  std::uint32_t index, vec3 x, vec2 u) {
   const Emitter& e = lights.emitters[index];
   return e.punctual() ? punctual_point(lights, e, x) : triangle_point(scene, lights, e, index, x, u);

@@ -91,18 +91,21 @@ LUMI_HD inline std::uint32_t rng_pixel(const CameraView& camera, Pixel pixel) {
          static_cast<std::uint32_t>(pixel.x);
 }
 
-// One ray a pixel of the window, in the order of `pixel_of_index`.
+// One ray a pixel of the window, in the order of `pixel_of_index`, and its pixel's rng_pixel.
 struct CameraKernel {
   CameraView camera;
   PixelWindow window;
   std::span<Ray> rays;
+  std::span<std::uint32_t> pixels;
   std::uint32_t seed = 0, frame = 0;
   bool jitter = true;  // uniform in the pixel; otherwise its centre
 
   LUMI_HD void operator()(int i) const {
     const Pixel pixel = pixel_of_index(window, i);
+    const std::uint32_t number = rng_pixel(camera, pixel);
+    pixels[static_cast<std::size_t>(i)] = number;
     vec2 offset(0.5f);
-    if (jitter) offset = vec2(Rng{seed, frame, rng_pixel(camera, pixel)}.uniform4(kDimPixel));
+    if (jitter) offset = vec2(Rng{seed, frame, number}.uniform4(kDimPixel));
     const vec2 at = vec2(static_cast<float>(pixel.x), static_cast<float>(pixel.y)) + offset;
     write_camera_ray(camera, at, rays[static_cast<std::size_t>(i)]);
   }

@@ -20,7 +20,7 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
   launch(walk_batches(count),
          DirectLightKernel{sampler, lighting.rng, dimension, 1.0f / static_cast<float>(lighting.spp), lighting.mis,
                            surfaces, pixels, buffers.shadow, buffers.contribution},
-         4);
+         kLaunchGrain / kWalkBatch);
   buffers.select_ms += milliseconds_since(start);
 
   start = std::chrono::steady_clock::now();

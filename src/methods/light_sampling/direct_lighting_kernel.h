@@ -82,7 +82,7 @@ struct DirectLightKernel {
       write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], u_point[k]));
   }
 
-  LUMI_HD void write(std::size_t i, const LightSample& sample) const {
+  LUMI_HD LUMI_ALWAYS_INLINE void write(std::size_t i, const LightSample& sample) const {
     if (!(max_component(sample.weight) > 0)) return;
     const Surface& surface = surfaces[i];
     const float cosine = glm::dot(surface.normal, sample.wi);

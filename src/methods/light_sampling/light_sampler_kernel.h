@@ -15,6 +15,7 @@
 // Oracle      LightSampler::Kind::kOne over every light in turn (selection "all"): the exhaustive sum.
 #pragma once
 
+#include "base/lanes.h"
 #include "base/rng.h"
 #include "lights/emitter.h"
 #include "lights/environment.h"
@@ -144,7 +145,8 @@ LUMI_HD inline float pdf_choose_emitter(const LightSampler& sampler, const Surfa
   return sampler.one == emitter ? 1.0f : 0.0f;
 }
 
-LUMI_HD inline LightSample local_sample(const LightSampler& sampler, const Surface& surface,
+// Inlined, as the light's point is: handed over in memory, its parts would be read before they are all written.
+LUMI_HD LUMI_ALWAYS_INLINE LightSample local_sample(const LightSampler& sampler, const Surface& surface,
                                         TreeSample chosen, vec2 u) {
   LightSample sample;
   if (!(chosen.pdf > 0)) return sample;
@@ -242,7 +244,7 @@ LUMI_HD inline LightSample sample_directional(const LightSampler& sampler, const
 }
 
 // The light of a group. `chosen` is choose_emitter's answer for group.r, used by local lights only.
-LUMI_HD inline LightSample light_in_group(const LightSampler& sampler, const Surface& surface,
+LUMI_HD LUMI_ALWAYS_INLINE LightSample light_in_group(const LightSampler& sampler, const Surface& surface,
                                           const ChosenGroup& group, TreeSample chosen, vec2 u_point) {
   switch (group.group) {
     case LightGroup::kLocal:

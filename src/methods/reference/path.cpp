@@ -117,6 +117,7 @@ void add_path_light(const PathTracing& tracing, std::span<const Surface> surface
                     std::span<const std::uint32_t> pixels, PathBuffers& buffers, std::span<vec3> direct,
                     std::span<vec3> indirect) {
   const Batch batch{tracing, pixels, buffers, direct, indirect};
+  if (batch.last_ray() == 0) return;
   int count = start(batch, surfaces);
   for (int ray_number = 1; ray_number <= batch.last_ray() && count > 0; ++ray_number) {
     scatter(batch, count, ray_number);
