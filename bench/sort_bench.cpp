@@ -8,7 +8,7 @@ namespace lumigrove::bench {
 
 Result sort_radix_1m(const Options& options) {
   constexpr std::uint32_t kCount = 1000000;
-  std::vector<KeyIndex> input(kCount), pairs, scratch;
+  LargeArray<KeyIndex> input(kCount), pairs, scratch;
   for (std::uint32_t i = 0; i < kCount; ++i) input[i] = {pcg4d(uvec4(i, 0, 0, 0)).x & 0x3fffffffu, i};
   const auto less = [](KeyIndex a, KeyIndex b) { return a.key < b.key; };
   const PairTimes times = time_in_turns(

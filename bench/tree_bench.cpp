@@ -12,14 +12,14 @@ namespace lumigrove::bench {
 namespace {
 
 // The keys that the tree sorts: Morton codes of the emitters' centres in their box.
-std::vector<KeyIndex> morton_keys(const LightView& lights) {
+LargeArray<KeyIndex> morton_keys(const LightView& lights) {
   const auto centre = [](const Emitter& e) {
     return e.punctual() ? e.p0 : e.p0 + (e.e1 + e.e2) * (1.0f / 3);
   };
   Box3 box;
   for (const Emitter& e : lights.emitters) box = unite(box, centre(e));
   const vec3 scale = inverse_extent(box);
-  std::vector<KeyIndex> keys;
+  LargeArray<KeyIndex> keys;
   for (const Emitter& e : lights.emitters) {
     keys.push_back({morton30((centre(e) - box.lo) * scale), static_cast<std::uint32_t>(keys.size())});
   }
@@ -76,8 +76,8 @@ Result build_tree_1m(const Options& options) {
   RenderStats stats;
   const std::unique_ptr<World> world = make_world(scene, settings, stats);
   const LightView lights = world->lights.view();
-  const std::vector<KeyIndex> input = morton_keys(lights);
-  std::vector<KeyIndex> pairs;
+  const LargeArray<KeyIndex> input = morton_keys(lights);
+  LargeArray<KeyIndex> pairs;
   const auto less = [](KeyIndex a, KeyIndex b) { return a.key < b.key; };
   const PairTimes times = time_in_turns(
       options.runs, [&] { world->tree.build(lights, {settings.direct.width, settings.direct.cones, false}); },

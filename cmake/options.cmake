@@ -2,7 +2,7 @@
 add_library(lumigrove_options INTERFACE)
 target_compile_options(lumigrove_options INTERFACE
   -march=${LUMIGROVE_ARCH}
-  -fno-math-errno -fno-trapping-math      # let loops over children vectorise; NaN and infinity keep their meaning
+  -fno-math-errno -fno-trapping-math -fno-tree-slp-vectorize      # let loops over children vectorise; NaN and infinity keep their meaning
   -Wno-psabi -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
   $<$<BOOL:${LUMIGROVE_WERROR}>:-Werror>)
 if(LUMIGROVE_SANITIZE)

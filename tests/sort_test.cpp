@@ -9,18 +9,18 @@
 namespace lumigrove {
 namespace {
 
-std::vector<KeyIndex> random_pairs(std::size_t count, std::uint32_t mask, unsigned seed) {
+LargeArray<KeyIndex> random_pairs(std::size_t count, std::uint32_t mask, unsigned seed) {
   std::mt19937 random(seed);
-  std::vector<KeyIndex> pairs(count);
+  LargeArray<KeyIndex> pairs(count);
   for (std::size_t i = 0; i < count; ++i) {
     pairs[i] = {static_cast<std::uint32_t>(random()) & mask, static_cast<std::uint32_t>(i)};
   }
   return pairs;
 }
 
-void expect_sorted_like_stable_sort(std::vector<KeyIndex> pairs, int bits) {
+void expect_sorted_like_stable_sort(LargeArray<KeyIndex> pairs, int bits) {
   const std::uint32_t mask = bits == 32 ? ~0u : (1u << bits) - 1u;
-  std::vector<KeyIndex> expected = pairs, scratch;
+  LargeArray<KeyIndex> expected = pairs, scratch;
   std::stable_sort(expected.begin(), expected.end(),
                    [&](KeyIndex a, KeyIndex b) { return (a.key & mask) < (b.key & mask); });
   radix_sort(pairs, bits, scratch);
@@ -47,7 +47,7 @@ TEST(RadixSort, KeepsTheOrderOfEqualKeys) {
 }
 
 TEST(RadixSort, SortsAscendingAndDescendingInput) {
-  std::vector<KeyIndex> up, down;
+  LargeArray<KeyIndex> up, down;
   for (std::uint32_t i = 0; i < 30000; ++i) {
     up.push_back({i * 7, i});
     down.push_back({(30000 - i) * 7, i});
@@ -57,7 +57,7 @@ TEST(RadixSort, SortsAscendingAndDescendingInput) {
 }
 
 TEST(RadixSort, ReusesScratchOfAnySize) {
-  std::vector<KeyIndex> scratch(7), large = random_pairs(9000, ~0u, 4), small = random_pairs(100, ~0u, 5);
+  LargeArray<KeyIndex> scratch(7), large = random_pairs(9000, ~0u, 4), small = random_pairs(100, ~0u, 5);
   radix_sort(large, 32, scratch);
   radix_sort(small, 32, scratch);
   const auto less = [](KeyIndex a, KeyIndex b) { return a.key < b.key; };
@@ -66,11 +66,11 @@ TEST(RadixSort, ReusesScratchOfAnySize) {
 }
 
 TEST(RadixSort, HasTheSameResultForAnyThreadCount) {
-  const std::vector<KeyIndex> input = random_pairs(200000, 0xffu, 6);
-  std::vector<KeyIndex> first, scratch;
+  const LargeArray<KeyIndex> input = random_pairs(200000, 0xffu, 6);
+  LargeArray<KeyIndex> first, scratch;
   for (const std::size_t threads : {1, 2, 4}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    std::vector<KeyIndex> pairs = input;
+    LargeArray<KeyIndex> pairs = input;
     radix_sort(pairs, 8, scratch);
     if (first.empty()) first = pairs;
     for (std::size_t i = 0; i < pairs.size(); ++i) ASSERT_EQ(pairs[i].index, first[i].index);

@@ -28,8 +28,9 @@ namespace lumigrove {
 #else
 #define LUMI_ALWAYS_INLINE [[gnu::always_inline]] inline
 #endif
-// Starts loading a cache line that will be read soon.
-LUMI_HD inline void prefetch(const void* address) {
+// Starts loading a cache line that will be read soon. To be called from inlined functions only: GCC drops calls of a
+// function that does nothing else.
+LUMI_HD LUMI_ALWAYS_INLINE void prefetch(const void* address) {
 #if LUMI_VECTOR_LANES
   __builtin_prefetch(address);
 #else

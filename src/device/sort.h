@@ -3,7 +3,8 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
+
+#include "base/large_array.h"
 
 namespace lumigrove {
 
@@ -13,6 +14,6 @@ struct KeyIndex {
 
 // Stable, ascending, by the low `bits` of key. `scratch` is resized as needed and may be reused between calls.
 // The result does not depend on the number of threads.
-void radix_sort(std::span<KeyIndex> pairs, int bits, std::vector<KeyIndex>& scratch);
+void radix_sort(std::span<KeyIndex> pairs, int bits, LargeArray<KeyIndex>& scratch);
 
 }  // namespace lumigrove

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "base/large_array.h"
 #include "base/vec.h"
 #include "lumigrove/scene.h"
 #include "lumigrove/settings.h"
@@ -107,7 +108,7 @@ class LightSet {
 
   const Environment environment_;
   std::vector<MeshEmission> meshes_;
-  std::vector<Emitter> emitters_;
+  LargeArray<Emitter> emitters_;
   std::vector<EmissiveInstance> instances_;
   std::vector<PunctualView> punctual_;
   std::vector<DirectionalView> directional_;

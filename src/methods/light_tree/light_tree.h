@@ -1,12 +1,10 @@
 // The perfect light tree: build and storage. light_tree_kernel.h holds the method and its header block.
 #pragma once
 
-#include <tbb/cache_aligned_allocator.h>
-
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
+#include "base/large_array.h"
 #include "device/sort.h"
 #include "lights/light_set.h"
 #include "methods/light_tree/light_tree_kernel.h"
@@ -34,9 +32,9 @@ class LightTree {
   int find_first_cones() const;
 
   LightTreeView view_;
-  std::vector<std::byte, tbb::cache_aligned_allocator<std::byte>> nodes_;
-  std::vector<std::uint32_t> leaf_emitters_, emitter_leaves_;
-  std::vector<KeyIndex> keys_, scratch_;
+  LargeArray<std::byte> nodes_;
+  LargeArray<std::uint32_t> leaf_emitters_, emitter_leaves_;
+  LargeArray<KeyIndex> keys_, scratch_;
   double build_ms_ = 0;
 };
 
