@@ -57,6 +57,7 @@ class PathBatch {
     Light light{std::vector<vec3>(n, vec3(0)), std::vector<vec3>(n, vec3(0))};
     PathTracing tracing;
     tracing.lighting = lighting;
+    tracing.first_spp = lighting.spp;
     tracing.max_bounces = settings_.indirect.max_bounces;
     tracing.roulette_start = settings_.indirect.roulette_start;
     tracing.force_diffuse = settings_.force_diffuse;
@@ -437,6 +438,11 @@ TEST(PathTracer, LightSamplingBsdfSamplingAndBothAgree) {
     EXPECT_GT(agreement(bsdf.direct, both.direct), 1e-3) << name;
     EXPECT_GT(agreement(bsdf.indirect, both.indirect), 1e-3) << name;
   }
+  // The weights count the light samples.
+  settings.direct.spp = 3;
+  const BlockMeans three = run(Selection::kRoot, Strategy::kBoth, 300);
+  EXPECT_GT(agreement(bsdf.direct, three.direct), 1e-3);
+  EXPECT_GT(agreement(bsdf.indirect, three.indirect), 1e-3);
 }
 
 TEST(PathTracer, BalanceWeightsOfBothStrategiesAddToOne) {

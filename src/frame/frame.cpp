@@ -70,6 +70,7 @@ void timed(double& ms, const Step& step) {
 PathTracing make_path_tracing(const Settings& settings, const DirectLighting& direct) {
   PathTracing tracing;
   tracing.lighting = direct;
+  tracing.first_spp = direct.spp;
   tracing.lighting.spp = 1;  // direct.spp is for what the camera sees
   tracing.max_bounces = settings.indirect.transport == Transport::kPath ? settings.indirect.max_bounces : 0;
   tracing.roulette_start = settings.indirect.roulette_start;

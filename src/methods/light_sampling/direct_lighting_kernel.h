@@ -88,7 +88,8 @@ struct DirectLightKernel {
     const float cosine = glm::dot(surface.normal, sample.wi);
     if (!(cosine > 0)) return;
     vec3 light = bsdf_eval(surface, sample.wi) * sample.weight * (cosine * scale);
-    if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + bsdf_pdf(surface, sample.wi));
+    // Balance heuristic of n = 1 / scale light samples and one BSDF sample.
+    if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + scale * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;
     contribution[i] = light;
     shadow[i] = shadow_ray(surface, sample, sampler.lights.diagonal);

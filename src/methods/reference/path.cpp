@@ -35,7 +35,11 @@ struct Batch {
   // The last ray leads to the last vertex, or one further to see whether that light was an emitter's.
   int last_ray() const { return tracing.max_bounces + (finds_emitters() ? 1 : 0); }
   std::span<vec3> film(int ray_number) const { return ray_number == 1 ? direct : indirect; }
-  LightDensity density() const { return {tracing.lighting.sampler, tracing.lighting.all, tracing.bsdf_only}; }
+  // Of light sampling at the surface that a ray left.
+  LightDensity density(int ray_number) const {
+    const int samples = ray_number == 1 ? tracing.first_spp : tracing.lighting.spp;
+    return {tracing.lighting.sampler, tracing.lighting.all, tracing.bsdf_only, static_cast<float>(samples)};
+  }
 };
 
 int start(const Batch& batch, std::span<const Surface> first) {
@@ -74,7 +78,7 @@ int arrive(const Batch& batch, int count, int ray_number) {
   const LightSampler& sampler = batch.tracing.lighting.sampler;
   const std::span<vec3> film = batch.film(ray_number);
   if (batch.finds_emitters() && sampler.lights.environment.present())
-    launch(count, PathEscapeKernel{batch.density(), b.surfaces, b.paths, b.rays, b.hits, film});
+    launch(count, PathEscapeKernel{batch.density(ray_number), b.surfaces, b.paths, b.rays, b.hits, film});
   compact(
       count, [&](int i) { return b.hits[static_cast<std::size_t>(i)].instance != kNone; }, b.kept);
   b.next_surfaces.resize(b.kept.size());
@@ -85,7 +89,7 @@ int arrive(const Batch& batch, int count, int ray_number) {
                                    b.next_surfaces, b.next_paths});
   if (batch.finds_emitters())
     launch(arrived,
-           PathEmissionKernel{batch.density(), b.kept, b.surfaces, b.next_surfaces, b.next_paths, film});
+           PathEmissionKernel{batch.density(ray_number), b.kept, b.surfaces, b.next_surfaces, b.next_paths, film});
   std::swap(b.surfaces, b.next_surfaces);
   std::swap(b.paths, b.next_paths);
   return arrived;

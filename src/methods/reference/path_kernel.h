@@ -6,14 +6,13 @@
 // Symbols     T_k -> PathState::throughput -> product of f cos / p over the vertices before ray k; no unit
 //             p_b -> PathState::pdf, bsdf_pdf -> density of the BSDF sample, per steradian at the vertex
 //             it left
-//             p_l -> pdf_of_hit, pdf_of_escape -> density of light sampling in that direction, likewise
-//             w_b = p_b / (p_b + p_l) -> balance_weight -> weight of the BSDF sample; no unit
+//             n p_l -> pdf_of_hit, pdf_of_escape -> density of light sampling in that direction, likewise, times
+//             the number of light samples
+//             w_b = p_b / (p_b + n p_l) -> balance_weight -> weight of the BSDF sample; no unit
 // Equations   Veach & Guibas (9), balance heuristic -> balance_weight, and DirectLightKernel for light
 //             samples: the two weights of one direction sum to 1
-// Departures  A wavefront: one ray of every path at a time, so that rays are traced in batches. Several
-//             light samples at a vertex are averaged after weighting each as if it were alone (a valid,
-//             slightly worse, heuristic). Roulette survives with probability min(1, largest component of
-//             the throughput).
+// Departures  A wavefront: one ray of every path at a time, so that rays are traced in batches. Roulette
+//             survives with probability min(1, largest component of the throughput).
 // Estimator   unbiased up to the number of bounces asked for. Path k = 0 is the visible surface; light that
 //             reaches it straight from an emitter is direct, what takes 1 to max_bounces detours indirect.
 // In -> Out   first surfaces (no hit: no path), random keys -> radiance added to `direct` (only what BSDF
@@ -95,18 +94,19 @@ struct LightDensity {
   LightSampler sampler;
   bool all = false;   // every light is sampled, not one
   bool none = false;  // there is no light sampling
+  float samples = 1;  // n, of each light or of one
 
-  // Of point `y` on the emissive triangle `emitter`, per steradian at `from`. 0 if it is not in the light
-  // set.
+  // Of point `y` on the emissive triangle `emitter`, per steradian at `from`, times n. 0 if it is not in the
+  // light set.
   LUMI_HD float pdf_of_hit(const Surface& from, std::uint32_t emitter, vec3 y) const {
     if (none || emitter == kNoEmitter) return 0;
-    if (all) return pdf_emitter_point(sampler.lights, emitter, from.position, y);
-    return pdf_light(sampler, from, emitter, y);
+    return samples * (all ? pdf_emitter_point(sampler.lights, emitter, from.position, y)
+                          : pdf_light(sampler, from, emitter, y));
   }
   LUMI_HD float pdf_of_escape(const Surface& from, vec3 wi) const {
     if (none) return 0;
-    if (all) return pdf_environment(sampler.lights.environment, from.normal, wi);
-    return pdf_light_environment(sampler, from, wi);
+    return samples * (all ? pdf_environment(sampler.lights.environment, from.normal, wi)
+                          : pdf_light_environment(sampler, from, wi));
   }
 };
 
