@@ -113,6 +113,12 @@ inline Lanes<W> keep_if_not_above(Lanes<W> x, Lanes<W> y, Lanes<W> a) {
   return x <= y ? a : Lanes<W>{};
 }
 
+// x where a > b, elsewhere y.
+template <int W>
+inline Lanes<W> choose_where_greater(Lanes<W> a, Lanes<W> b, Lanes<W> x, Lanes<W> y) {
+  return a > b ? x : y;
+}
+
 // All of a or all of b, without a branch.
 template <int W>
 inline Lanes<W> select_lanes(bool condition, Lanes<W> a, Lanes<W> b) {
@@ -149,6 +155,10 @@ inline Lanes<W> reciprocal_sqrt(Lanes<W> a) {
   if constexpr (W == 16) return (Lanes<W>)_mm512_maskz_rsqrt14_ps(0xffff, (__m512)a);
   if constexpr (W == 8) return (Lanes<W>)_mm256_rsqrt14_ps((__m256)a);
   if constexpr (W == 4) return (Lanes<W>)_mm_rsqrt14_ps((__m128)a);
+  if constexpr (W == 2) {  // the same bits as in wider lanes
+    const auto roots = reciprocal_sqrt<4>(Lanes<4>{a[0], a[1], 1, 1});
+    return Lanes<W>{roots[0], roots[1]};
+  }
 #endif
   Lanes<W> root;
   for (int c = 0; c < W; ++c) root[c] = __builtin_sqrtf(a[c]);
@@ -230,6 +240,7 @@ LUMI_HD inline Lanes<W> broadcast(float x) {
 LUMI_LANE_OPERATOR(+)
 LUMI_LANE_OPERATOR(-)
 LUMI_LANE_OPERATOR(*)
+LUMI_LANE_OPERATOR(/)
 #undef LUMI_LANE_OPERATOR
 
 template <int W>
@@ -265,6 +276,12 @@ LUMI_HD inline Lanes<W> multiply_add(const Lanes<W>& a, const Lanes<W>& b, const
 template <int W>
 LUMI_HD inline Lanes<W> keep_if_not_above(const Lanes<W>& x, const Lanes<W>& y, const Lanes<W>& a) {
   return make_lanes<W>([&](int c) { return x[c] <= y[c] ? a[c] : 0.0f; });
+}
+
+template <int W>
+LUMI_HD inline Lanes<W> choose_where_greater(const Lanes<W>& a, const Lanes<W>& b, const Lanes<W>& x,
+                                             const Lanes<W>& y) {
+  return make_lanes<W>([&](int c) { return a[c] > b[c] ? x[c] : y[c]; });
 }
 
 template <int W>

@@ -50,7 +50,7 @@ struct DirectLightKernel {
   }
 
   LUMI_HD void light_by_walks(std::size_t first, int count) const {
-    WalkPoint points[kWalkBatch] = {};
+    WalkPoints points;
     ChosenGroup groups[kWalkBatch];
     vec2 u_point[kWalkBatch];
     std::size_t index[kWalkBatch];
@@ -66,7 +66,7 @@ struct DirectLightKernel {
         write(i, light_in_group(sampler, surface, group, {}, vec2(u.y, u.z)));
         continue;
       }
-      points[walks] = {surface.position, group.r, surface.normal, u.w};
+      points.set(walks, surface.position, surface.normal, vec2(group.r, u.w));
       groups[walks] = group;
       u_point[walks] = vec2(u.y, u.z);
       index[walks++] = i;

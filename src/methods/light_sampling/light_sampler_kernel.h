@@ -70,8 +70,8 @@ LUMI_HD inline GroupProbabilities group_probabilities(const LightSampler& sample
   return {share(local_flux), share(directional_flux), share(environment_flux)};
 }
 
-// Walks for at most kWalkBatch points.
-LUMI_HD inline void sample_trees(const LightTreeView& tree, const WalkPoint* points, int count,
+// Walks for the first `count` points.
+LUMI_HD inline void sample_trees(const LightTreeView& tree, const WalkPoints& points, int count,
                                  TreeSample* samples) {
   switch (tree.count > 0 ? tree.width : 0) {
     case 0:
@@ -89,9 +89,10 @@ LUMI_HD inline void sample_trees(const LightTreeView& tree, const WalkPoint* poi
 }
 
 LUMI_HD inline TreeSample sample_tree(const LightTreeView& tree, vec3 x, vec3 n, vec2 u) {
-  const WalkPoint point{x, u.x, n, u.y};
+  WalkPoints points;
+  points.set(0, x, n, u);
   TreeSample sample;
-  sample_trees(tree, &point, 1, &sample);
+  sample_trees(tree, points, 1, &sample);
   return sample;
 }
 

@@ -57,6 +57,8 @@ void LightTree::build_levels(const LightView& lights) {
   for (std::uint32_t n = view_.count; n > 0 && (counts.empty() || n > 1);)
     counts.push_back(n = (n + W - 1) / W);
   view_.levels = static_cast<int>(counts.size());
+  if (view_.levels > 0)
+    view_.root_children = static_cast<int>(view_.levels > 1 ? counts[counts.size() - 2] : view_.count);
   std::uint32_t total = 0;
   for (int level = 0; level < view_.levels; ++level) {
     view_.level_first[level] = total;

@@ -62,6 +62,7 @@ struct LightTreeView {
   int levels = 0;                                  // of nodes; leaves lie below the last
   int width = 0;                                   // W
   std::uint32_t count = 0;                         // leaves
+  int root_children = 0;                           // that are not bogus
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
   int first_cones = 0;  // first level whose weights bound the emitters' own cosine; `levels` for none
 
@@ -72,33 +73,68 @@ struct LightTreeView {
   }
 };
 
+// Boxes, and what shines in them, one a lane: the children of a node, or one child for many points.
 template <int W>
-struct ChildWeights {
-  Lanes<W> weight;
-  Lanes<W> cumulative;  // sum of the weights up to and with this child's
-  float total;          // 0: no child can contribute
+struct BoxLanes {
+  LaneVec3<W> centre, half;
+  Lanes<W> intensity;
 };
+
+template <int W>
+struct ConeLanes {
+  LaneVec3<W> axis;  // times kConeAxis
+  Lanes<W> radius;   // times kConeRadius / 2
+};
+
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE BoxLanes<W> load_boxes(const LightNode<W>& node) {
+  return {{load_lanes<W>(node.centre_x), load_lanes<W>(node.centre_y), load_lanes<W>(node.centre_z)},
+          {load_lanes<W>(node.half_x), load_lanes<W>(node.half_y), load_lanes<W>(node.half_z)},
+          load_lanes<W>(node.intensity)};
+}
+
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE ConeLanes<W> load_cones(const LightNode<W>& node) {
+  return {{load_bytes<W>(node.axis_x), load_bytes<W>(node.axis_y), load_bytes<W>(node.axis_z)},
+          load_bytes<W>(node.radius)};
+}
+
+template <int P, int W>
+LUMI_HD LUMI_ALWAYS_INLINE BoxLanes<P> broadcast_box(const LightNode<W>& node, int c) {
+  return {broadcast<P>(vec3(node.centre_x[c], node.centre_y[c], node.centre_z[c])),
+          broadcast<P>(vec3(node.half_x[c], node.half_y[c], node.half_z[c])), broadcast<P>(node.intensity[c])};
+}
+
+template <int P, int W>
+LUMI_HD LUMI_ALWAYS_INLINE ConeLanes<P> broadcast_cone(const LightNode<W>& node, int c) {
+  return {broadcast<P>(vec3(node.axis_x[c], node.axis_y[c], node.axis_z[c])),
+          broadcast<P>(static_cast<float>(node.radius[c]))};
+}
 
 // Upper bound of cos at the emitters of every child, times `near`: n' (x - y) over all y in the box and n' in the
 // cone is at most axis (x - c) + |axis| h + radius (|x - c| + |h|), and the last sum at most sqrt(2) |far|.
 // `to_centre` is c - x, `half` is h.
 template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE Lanes<W> bound_facing(const LightNode<W>& node, const LaneVec3<W>& to_centre,
+LUMI_HD LUMI_ALWAYS_INLINE Lanes<W> bound_facing(const ConeLanes<W>& cone, const LaneVec3<W>& to_centre,
                                                  const LaneVec3<W>& half, const Lanes<W>& far) {
-  const LaneVec3<W> axis{load_bytes<W>(node.axis_x), load_bytes<W>(node.axis_y), load_bytes<W>(node.axis_z)};
-  const Lanes<W> scaled = dot<W>(abs_lanes<W>(axis), half) - dot<W>(axis, to_centre);
-  const Lanes<W> slack = load_bytes<W>(node.radius) * (far * (1.41422f * 2 / kConeRadius));
+  const Lanes<W> scaled = dot<W>(abs_lanes<W>(cone.axis), half) - dot<W>(cone.axis, to_centre);
+  const Lanes<W> slack = cone.radius * (far * (1.41422f * 2 / kConeRadius));
   return multiply_add<W>(scaled, broadcast<W>(1 / kConeAxis), slack);
 }
 
-// Equations 1 and 2 for the W children of a node at once.
+// Equation 1: w^max and w^min. `inside` is w^max without the distance where x is inside the box, elsewhere 0.
 template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
-                                                          vec3 x, vec3 n) {
+struct BoxWeights {
+  Lanes<W> near, far, inside;
+};
+
+// `cones` is asked for ConeLanes only when `use_cones`.
+template <int W, class Cones>
+LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, bool use_cones, const Cones& cones,
+                                                     float inside2, const LaneVec3<W>& x, const LaneVec3<W>& n) {
   const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), inside = broadcast<W>(inside2);
-  const LaneVec3<W> half{load_lanes<W>(node.half_x), load_lanes<W>(node.half_y), load_lanes<W>(node.half_z)};
-  const LaneVec3<W> to_centre{load_lanes<W>(node.centre_x) - x.x, load_lanes<W>(node.centre_y) - x.y,
-                              load_lanes<W>(node.centre_z) - x.z};
+  const LaneVec3<W>& half = box.half;
+  const LaneVec3<W> to_centre{box.centre.x - x.x, box.centre.y - x.y, box.centre.z - x.z};
   const LaneVec3<W> apart = abs_lanes<W>(to_centre);
   const LaneVec3<W> nearest{max_lanes<W>(apart.x - half.x, zero), max_lanes<W>(apart.y - half.y, zero),
                             max_lanes<W>(apart.z - half.z, zero)};
@@ -110,25 +146,38 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& no
 
   // Height of the box's highest corner above the tangent plane.
   const Lanes<W> margin = far * 2e-6f;
-  const Lanes<W> height = add_dot<W>(add_dot<W>(margin, broadcast<W>(vec3(std::fabs(n.x), std::fabs(n.y), std::fabs(n.z))), half), broadcast<W>(n), to_centre);
+  const Lanes<W> height = add_dot<W>(add_dot<W>(margin, abs_lanes<W>(n), half), n, to_centre);
   const Lanes<W> cosine = min_lanes<W>(max_lanes<W>(height, zero) * inverse_near, one);
-  Lanes<W> shining = load_lanes<W>(node.intensity) * cosine;
-  if (cones) {
-    const Lanes<W> facing = bound_facing<W>(node, to_centre, half, far);
+  Lanes<W> shining = box.intensity * cosine;
+  if (use_cones) {
+    const Lanes<W> facing = bound_facing<W>(cones(), to_centre, half, far);
     shining = shining * min_lanes<W>(max_lanes<W>(facing, zero) * inverse_near, one);
   }
+  return {shining * (inverse_near * inverse_near), shining * (inverse_far * inverse_far),
+          keep_if_not_above<W>(near2, inside, shining)};
+}
 
-  const Lanes<W> far_weight = shining * (inverse_far * inverse_far);
+template <int W>
+struct ChildWeights {
+  Lanes<W> weight;
+  Lanes<W> cumulative;  // sum of the weights up to and with this child's
+  float total;          // 0: no child can contribute
+};
+
+// Equations 1 and 2 for the W children of a node at once.
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
+                                                          vec3 x, vec3 n) {
+  const BoxWeights<W> boxes = weigh_boxes<W>(
+      load_boxes<W>(node), cones, [&] { return load_cones<W>(node); }, inside2, broadcast<W>(x), broadcast<W>(n));
   // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
-  const Lanes<W> inside_weight = keep_if_not_above<W>(near2, inside, shining);
-  const Lanes<W> near_weight = select_lanes<W>(greater_bits<W>(inside_weight, zero) != 0, inside_weight,
-                                               shining * (inverse_near * inverse_near));
-
+  const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
+  const Lanes<W> near = select_lanes<W>(is_inside, boxes.inside, boxes.near);
   // Near weights are scaled to the sum of the far ones, so that the average of both needs no other division.
-  const Lanes<W> near_sums = prefix_sum<W>(near_weight), far_sums = prefix_sum<W>(far_weight);
+  const Lanes<W> near_sums = prefix_sum<W>(near), far_sums = prefix_sum<W>(boxes.far);
   const float far_total = far_sums[W - 1];
   const Lanes<W> scale = broadcast<W>(far_total / near_sums[W - 1]);
-  return {multiply_add<W>(near_weight, scale, far_weight), multiply_add<W>(near_sums, scale, far_sums),
+  return {multiply_add<W>(near, scale, boxes.far), multiply_add<W>(near_sums, scale, far_sums),
           far_total + far_total};
 }
 
@@ -153,11 +202,20 @@ LUMI_HD LUMI_ALWAYS_INLINE ChosenChild choose_child(const ChildWeights<W>& child
   return {lane, weight / children.total, glm::min(glm::max(rest, 0.0f), 0x1.fffffep-1f)};
 }
 
-struct WalkPoint {
-  vec3 x;
-  float u0;  // chooses in the upper half of the levels
-  vec3 n;    // unit
-  float u1;  // chooses in the lower half, so that both keep enough bits for any depth
+// Points to walk for. Each coordinate by itself, so that many can be read at once.
+struct alignas(64) WalkPoints {
+  float x[kWalkBatch] = {}, y[kWalkBatch] = {}, z[kWalkBatch] = {};
+  float nx[kWalkBatch] = {}, ny[kWalkBatch] = {}, nz[kWalkBatch] = {};  // unit
+  float u0[kWalkBatch] = {};  // chooses in the upper half of the levels
+  float u1[kWalkBatch] = {};  // chooses in the lower half, so that both keep enough bits for any depth
+
+  LUMI_HD void set(int i, vec3 position, vec3 normal, vec2 u) {
+    x[i] = position.x, y[i] = position.y, z[i] = position.z;
+    nx[i] = normal.x, ny[i] = normal.y, nz[i] = normal.z;
+    u0[i] = u.x, u1[i] = u.y;
+  }
+  LUMI_HD vec3 position(int i) const { return {x[i], y[i], z[i]}; }
+  LUMI_HD vec3 normal(int i) const { return {nx[i], ny[i], nz[i]}; }
 };
 
 struct TreeSample {
@@ -165,47 +223,133 @@ struct TreeSample {
   float pdf = 0;
 };
 
-// One walk from the root for each of at most kWalkBatch points.
-template <int W>
-LUMI_HD inline void sample_light_tree(const LightTreeView& tree, const WalkPoint* points, int count,
-                                      TreeSample* samples) {
-  std::uint32_t node[kWalkBatch];
+// Where the walks of a batch are.
+struct WalkState {
+  std::uint32_t node[kWalkBatch];  // of the level to come
   float pdf[kWalkBatch], r[kWalkBatch];
-  int alive[kWalkBatch];
-  int living = count;
+  int alive[kWalkBatch];  // the first `living` are the walks not ended on a dead branch
+  int living;
+};
+
+// a[c] becomes a[0] + ... + a[c], added in the order of prefix_sum, so that the last is the same to the bit.
+template <int W, int P>
+LUMI_HD LUMI_ALWAYS_INLINE void prefix_sums_across(Lanes<P> (&a)[W]) {
+  for (int by = 1; by < W; by *= 2)
+    for (int c = W - 1; c >= by; --c) a[c] = a[c] + a[c - by];
+}
+
+// The step from the root, where all walks are at one node: P points at once, child by child, instead of W children
+// at once. A root with few children then costs little.
+template <int W, int P>
+LUMI_HD inline void step_from_root(const LightTreeView& tree, const WalkPoints& points, int first, WalkState& state) {
+  const LightNode<W>& root = *tree.level<W>(0);
+  const Lanes<P> zero = broadcast<P>(0);
+  const LaneVec3<P> x{load_lanes<P>(points.x + first), load_lanes<P>(points.y + first),
+                      load_lanes<P>(points.z + first)};
+  const LaneVec3<P> n{load_lanes<P>(points.nx + first), load_lanes<P>(points.ny + first),
+                      load_lanes<P>(points.nz + first)};
+  Lanes<P> near[W], far[W], inside[W];
+  Lanes<P> most_inside = zero;
+  for (int c = 0; c < W; ++c) near[c] = far[c] = inside[c] = zero;
+  for (int c = 0; c < tree.root_children; ++c) {
+    const BoxWeights<P> box = weigh_boxes<P>(
+        broadcast_box<P>(root, c), tree.first_cones == 0, [&] { return broadcast_cone<P>(root, c); }, tree.inside2,
+        x, n);
+    near[c] = box.near;
+    far[c] = box.far;
+    inside[c] = box.inside;
+    most_inside = max_lanes<P>(most_inside, box.inside);
+  }
+  for (int c = 0; c < tree.root_children; ++c)
+    near[c] = choose_where_greater<P>(most_inside, zero, inside[c], near[c]);
+
+  Lanes<P> near_sums[W], far_sums[W];
+  for (int c = 0; c < W; ++c) {
+    near_sums[c] = near[c];
+    far_sums[c] = far[c];
+  }
+  prefix_sums_across<W, P>(near_sums);
+  prefix_sums_across<W, P>(far_sums);
+  const Lanes<P> far_total = far_sums[W - 1], total = far_total + far_total;
+  const Lanes<P> scale = far_total / near_sums[W - 1];
+  const Lanes<P> target = load_lanes<P>(points.u0 + first) * total;
+
+  // From the last child to the first: the last of positive weight, then every one whose sum is beyond the target.
+  Lanes<P> lane = zero, weight = zero, sum = zero, any = zero;
+  for (int c = tree.root_children - 1; c >= 0; --c) {
+    const Lanes<P> child_weight = multiply_add<P>(near[c], scale, far[c]);
+    const Lanes<P> child_sum = multiply_add<P>(near_sums[c], scale, far_sums[c]);
+    const Lanes<P> beyond = choose_where_greater<P>(child_sum, target, child_weight, zero);
+    const Lanes<P> take = choose_where_greater<P>(any, zero, beyond, child_weight);
+    lane = choose_where_greater<P>(take, zero, broadcast<P>(static_cast<float>(c)), lane);
+    weight = choose_where_greater<P>(take, zero, child_weight, weight);
+    sum = choose_where_greater<P>(take, zero, child_sum, sum);
+    any = max_lanes<P>(any, child_weight);
+  }
+  const Lanes<P> rest = (target - (sum - weight)) / weight;
+  float lanes[P], totals[P];
+  store_lanes<P>(lane, lanes);
+  store_lanes<P>(total, totals);
+  store_lanes<P>(weight / total, state.pdf + first);
+  store_lanes<P>(min_lanes<P>(max_lanes<P>(rest, zero), broadcast<P>(0x1.fffffep-1f)), state.r + first);
+  for (int i = 0; i < P; ++i) {
+    state.node[first + i] = totals[i] > 0 ? static_cast<std::uint32_t>(lanes[i]) : 0;
+    if (!(totals[i] > 0)) state.pdf[first + i] = 0;
+  }
+}
+
+// Fetches early what the next step of a walk reads.
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE void prefetch_step(const LightTreeView& tree, int level, std::uint32_t node) {
+  if (level == tree.levels) {
+    prefetch(tree.leaf_emitters + node);
+    return;
+  }
+  const char* next = reinterpret_cast<const char*>(tree.level<W>(level) + node);
+  for (std::size_t line = 0; line < sizeof(LightNode<W>); line += 64) prefetch(next + line);
+}
+
+// The step of every living walk from a level below the root.
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkPoints& points, int level,
+                                          WalkState& state) {
+  const LightNode<W>* nodes = tree.level<W>(level);
+  const bool second_number = level == (tree.levels + 1) / 2;
+  int kept = 0;
+  for (int k = 0; k < state.living; ++k) {
+    const int i = state.alive[k];
+    const ChildWeights<W> children = weigh_children<W>(nodes[state.node[i]], level >= tree.first_cones,
+                                                       tree.inside2, points.position(i), points.normal(i));
+    const ChosenChild chosen = choose_child<W>(children, second_number ? points.u1[i] : state.r[i]);
+    state.node[i] = state.node[i] * W + static_cast<std::uint32_t>(chosen.lane);
+    state.pdf[i] *= chosen.probability;
+    state.r[i] = chosen.r;
+    state.alive[kept] = i;
+    kept += children.total > 0 ? 1 : 0;
+    prefetch_step<W>(tree, level + 1, state.node[i]);
+  }
+  state.living = kept;
+}
+
+// One walk from the root for each of the first `count` points.
+template <int W>
+LUMI_HD inline void sample_light_tree(const LightTreeView& tree, const WalkPoints& points, int count,
+                                      TreeSample* samples) {
+  constexpr int kPoints = kWalkBatch < 16 ? kWalkBatch : 16;
+  WalkState state;
+  state.living = 0;
+  for (int first = 0; first < count; first += kPoints) step_from_root<W, kPoints>(tree, points, first, state);
   for (int i = 0; i < count; ++i) {
-    alive[i] = i;
-    node[i] = 0;
-    pdf[i] = 1;
-    r[i] = points[i].u0;
     samples[i] = {};
+    state.alive[state.living] = i;
+    state.living += state.pdf[i] > 0 ? 1 : 0;
+    prefetch_step<W>(tree, 1, state.node[i]);
   }
-  const int middle = (tree.levels + 1) / 2;
-  for (int level = 0; level < tree.levels; ++level) {
-    const LightNode<W>* nodes = tree.level<W>(level);
-    const bool last = level + 1 == tree.levels;
-    const LightNode<W>* below = last ? nullptr : tree.level<W>(level + 1);
-    int kept = 0;
-    for (int k = 0; k < living; ++k) {
-      const int i = alive[k];
-      const WalkPoint& point = points[i];
-      const ChildWeights<W> children = weigh_children<W>(nodes[node[i]], level >= tree.first_cones, tree.inside2, point.x, point.n);
-      const ChosenChild chosen = choose_child<W>(children, level == middle ? point.u1 : r[i]);
-      node[i] = node[i] * W + static_cast<std::uint32_t>(chosen.lane);
-      pdf[i] *= chosen.probability;
-      r[i] = chosen.r;
-      alive[kept] = i;
-      kept += children.total > 0 ? 1 : 0;
-      if (last) {
-        prefetch(tree.leaf_emitters + node[i]);
-      } else {
-        const char* next = reinterpret_cast<const char*>(below + node[i]);
-        for (std::size_t line = 0; line < sizeof(LightNode<W>); line += 64) prefetch(next + line);
-      }
-    }
-    living = kept;
+  for (int level = 1; level < tree.levels; ++level) step_down<W>(tree, points, level, state);
+  for (int k = 0; k < state.living; ++k) {
+    const int i = state.alive[k];
+    samples[i] = {tree.leaf_emitters[state.node[i]], state.pdf[i]};
   }
-  for (int k = 0; k < living; ++k) samples[alive[k]] = {tree.leaf_emitters[node[alive[k]]], pdf[alive[k]]};
 }
 
 // Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same order.
