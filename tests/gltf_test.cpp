@@ -151,7 +151,7 @@ int count_warnings(const Scene& scene, const std::string& part) {
   return static_cast<int>(std::count_if(scene.warnings.begin(), scene.warnings.end(),
                                         [&](const std::string& w) { return contains(w, part); }));
 }
-void expect_near(vec3 a, vec3 b) {
+void expect_vector(vec3 a, vec3 b) {
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], 1e-5f) << "component " << k;
 }
 
@@ -178,8 +178,8 @@ TEST_F(Gltf, ThreeNodesSharingOneLightGiveThreeLights) {
   ASSERT_EQ(state.lights.size(), 3u);
   for (int i = 0; i < 3; ++i) {
     const LightInstance& light = state.lights[static_cast<std::size_t>(i)];
-    expect_near(light.position, vec3(i, 0, 0));
-    expect_near(light.light.color, vec3(8, 4, 2));
+    expect_vector(light.position, vec3(i, 0, 0));
+    expect_vector(light.light.color, vec3(8, 4, 2));
     EXPECT_EQ(light.light.range, 20);
   }
 }
@@ -200,8 +200,8 @@ TEST_F(Gltf, SpotConesAndDirectionalLightsAreKept) {
   EXPECT_FLOAT_EQ(state.lights[1].light.inner_cone, 0.0f);
   EXPECT_FLOAT_EQ(state.lights[1].light.outer_cone, kPi / 4);
   EXPECT_EQ(state.lights[2].light.type, LightType::kDirectional);
-  expect_near(state.lights[2].light.color, vec3(3));
-  expect_near(state.lights[2].direction, vec3(0, -1, 0));
+  expect_vector(state.lights[2].light.color, vec3(3));
+  expect_vector(state.lights[2].direction, vec3(0, -1, 0));
 }
 
 TEST_F(Gltf, EmissiveStrengthMultipliesTheFactor) {
@@ -212,7 +212,7 @@ TEST_F(Gltf, EmissiveStrengthMultipliesTheFactor) {
                           {"doubleSided", true},
                           {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 40}}}}}});
   const Material material = load(asset).materials[0];
-  expect_near(material.emission, vec3(40, 20, 0));
+  expect_vector(material.emission, vec3(40, 20, 0));
   EXPECT_TRUE(material.double_sided);
 }
 
@@ -227,14 +227,14 @@ TEST_F(Gltf, MaterialsAndTheirDefaultsFollowTheSpecification) {
        {"name", "m"}});
   const Scene scene = load(asset);
   ASSERT_EQ(scene.materials.size(), 2u);
-  expect_near(scene.materials[0].base_color, vec3(0.1f, 0.2f, 0.3f));
+  expect_vector(scene.materials[0].base_color, vec3(0.1f, 0.2f, 0.3f));
   EXPECT_FLOAT_EQ(scene.materials[0].alpha, 0.4f);
   EXPECT_FLOAT_EQ(scene.materials[0].metallic, 0.5f);
   EXPECT_FLOAT_EQ(scene.materials[0].roughness, 0.25f);
   EXPECT_EQ(scene.materials[0].alpha_mode, AlphaMode::kMask);
   EXPECT_FLOAT_EQ(scene.materials[0].alpha_cutoff, 0.75f);
   EXPECT_EQ(scene.meshes[0].material, 1);  // the primitive names none
-  expect_near(scene.materials[1].base_color, vec3(1));
+  expect_vector(scene.materials[1].base_color, vec3(1));
   EXPECT_FLOAT_EQ(scene.materials[1].metallic, 1);
   EXPECT_FLOAT_EQ(scene.materials[1].roughness, 1);
 }
@@ -257,8 +257,8 @@ TEST_F(Gltf, SharedMeshesAreInstancesAndMirroringIsKept) {
   EXPECT_EQ(scene.meshes.size(), 1u);
   const SceneState state = evaluate(scene, 0);
   ASSERT_EQ(state.instances.size(), 3u);
-  expect_near(state.instances[1].to_world[0], vec3(-1, 0, 0));
-  expect_near(transform_point(state.instances[2].to_world, vec3(1, 0, 0)), vec3(7, 6, 7));
+  expect_vector(state.instances[1].to_world[0], vec3(-1, 0, 0));
+  expect_vector(transform_point(state.instances[2].to_world, vec3(1, 0, 0)), vec3(7, 6, 7));
 }
 
 TEST_F(Gltf, OnlyTheDefaultSceneIsKept) {
@@ -270,7 +270,7 @@ TEST_F(Gltf, OnlyTheDefaultSceneIsKept) {
   asset.json["scene"] = 1;
   const SceneState state = evaluate(load(asset), 0);
   ASSERT_EQ(state.instances.size(), 1u);
-  expect_near(state.instances[0].to_world[3], vec3(0, 5, 0));
+  expect_vector(state.instances[0].to_world[3], vec3(0, 5, 0));
   asset.json["scene"] = 2;
   EXPECT_TRUE(contains(error_of(asset), "scene 2"));
   asset.json.erase("scene");
@@ -317,8 +317,8 @@ TEST_F(Gltf, CamerasKeepTheirFieldOfViewAndName) {
   ASSERT_EQ(state.cameras.size(), 1u);
   EXPECT_EQ(state.cameras[0].camera.name, "hero");
   EXPECT_FLOAT_EQ(state.cameras[0].camera.vertical_fov, 0.7f);
-  expect_near(state.cameras[0].position, vec3(1, 2, 3));
-  expect_near(state.cameras[0].forward, vec3(0, 0, -1));
+  expect_vector(state.cameras[0].position, vec3(1, 2, 3));
+  expect_vector(state.cameras[0].forward, vec3(0, 0, -1));
 }
 
 TEST_F(Gltf, AnimationsKeepTheirInterpolation) {
@@ -343,12 +343,12 @@ TEST_F(Gltf, AnimationsKeepTheirInterpolation) {
   const Scene scene = load(asset);
   EXPECT_EQ(duration(scene), 1.0);
   const SceneState half = evaluate(scene, 0.5);
-  expect_near(half.instances[0].to_world[3], vec3(0));        // STEP
-  expect_near(half.instances[0].to_world[0], vec3(2, 0, 0));  // CUBICSPLINE with flat tangents
+  expect_vector(half.instances[0].to_world[3], vec3(0));        // STEP
+  expect_vector(half.instances[0].to_world[0], vec3(2, 0, 0));  // CUBICSPLINE with flat tangents
   const float c = std::cos(kPi / 4);
-  expect_near(half.instances[1].to_world[0], vec3(c, c, 0));  // slerp
-  expect_near(half.instances[1].to_world[3], vec3(1, 0, 0));  // LINEAR
-  expect_near(evaluate(scene, 1).instances[0].to_world[3], vec3(2, 0, 0));
+  expect_vector(half.instances[1].to_world[0], vec3(c, c, 0));  // slerp
+  expect_vector(half.instances[1].to_world[3], vec3(1, 0, 0));  // LINEAR
+  expect_vector(evaluate(scene, 1).instances[0].to_world[3], vec3(2, 0, 0));
 }
 
 TEST_F(Gltf, ChannelsThatMoveNoNodeWarnAndLeaveTheOthers) {
@@ -392,7 +392,7 @@ TEST_F(Gltf, SkinsAndMorphTargetsWarnOnceAndKeepTheBaseShape) {
   const Scene scene = load(asset);
   EXPECT_EQ(count_warnings(scene, "skins"), 1);
   EXPECT_EQ(count_warnings(scene, "morph"), 1);
-  expect_near(scene.meshes[0].positions[1], vec3(1, 0, 0));
+  expect_vector(scene.meshes[0].positions[1], vec3(1, 0, 0));
 }
 
 TEST_F(Gltf, IndicesOfEveryWidthStripsAndFans) {
@@ -460,7 +460,7 @@ TEST_F(Gltf, StridedNormalizedAndSparseAttributes) {
               {{{"attributes", {{"POSITION", positions}, {"COLOR_0", colors}, {"TEXCOORD_0", uvs}}}}}}});
   asset.add("nodes", {{"mesh", 0}});
   const Mesh mesh = load(asset).meshes[0];
-  expect_near(mesh.positions[2], vec3(0, 1, 0));
+  expect_vector(mesh.positions[2], vec3(0, 1, 0));
   EXPECT_EQ(mesh.colors[1], vec4(0, 1, 0, 0));
   EXPECT_FLOAT_EQ(mesh.colors[2].z, 0.2f);
   EXPECT_EQ(mesh.uv0[1], vec2(0));
@@ -480,8 +480,8 @@ TEST_F(Gltf, QuantizedPositionsAreReadAsTheyAre) {
   asset.add("meshes", {{"primitives", {{{"attributes", {{"POSITION", positions}}}}}}});
   asset.add("nodes", {{"mesh", 0}});
   const Mesh mesh = load(asset).meshes[0];
-  expect_near(mesh.positions[1], vec3(100, 0, 0));
-  expect_near(mesh.positions[2], vec3(0, -50, 0));
+  expect_vector(mesh.positions[1], vec3(100, 0, 0));
+  expect_vector(mesh.positions[2], vec3(0, -50, 0));
 }
 
 TEST_F(Gltf, TexturesKeepTexelsSamplersAndTransforms) {

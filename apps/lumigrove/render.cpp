@@ -140,7 +140,7 @@ void run(const RenderOptions& options) {
 }
 
 // Needs no scene, hence ends the program before the scene is asked for.
-void print_devices() {
+void print_devices_and_exit() {
   fmt::print("{}", device_list());
   throw ExitCode{0};
 }
@@ -174,7 +174,7 @@ void add_render_command(CLI::App& app) {
   command->add_flag("--print-camera", options->print_camera, "Print the camera as options and exit")
       ->group("View");
   command->add_option("--device", options->device, "Where to render, one of `list devices` (default cpu)");
-  command->add_flag_callback("--list-devices", print_devices, "List devices and exit");
+  command->add_flag_callback("--list-devices", print_devices_and_exit, "List devices and exit");
   add_stats_option(*command, options->stats);
   add_progress_option(*command, options->progress);
   options->log = add_log_options(*command);

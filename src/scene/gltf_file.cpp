@@ -18,9 +18,9 @@ namespace {
 using Json = nlohmann::json;
 using Bytes = std::vector<unsigned char>;
 
-constexpr std::array<std::string_view, 4> kExtensions = {"KHR_lights_punctual",
-                                                         "KHR_materials_emissive_strength",
-                                                         "KHR_texture_transform", "KHR_mesh_quantization"};
+constexpr std::array<std::string_view, 4> kKnownExtensions = {
+    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_texture_transform",
+    "KHR_mesh_quantization"};
 // tinygltf and the JSON writer recurse; no real asset nests deeper.
 constexpr int kDeepestNesting = 200;
 
@@ -148,7 +148,7 @@ std::vector<std::string> extension_names(const Json& json, const char* key, cons
 
 void check_extensions(const Json& json, GltfFile& file) {
   const auto supported = [](const std::string& extension) {
-    return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
+    return std::find(kKnownExtensions.begin(), kKnownExtensions.end(), extension) != kKnownExtensions.end();
   };
   for (const std::string& extension : extension_names(json, "extensionsRequired", file.name))
     if (!supported(extension))

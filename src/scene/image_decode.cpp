@@ -47,7 +47,7 @@ std::string extension_of(std::span<const unsigned char> file, const std::string&
   return dot == std::string::npos ? "" : name.substr(dot + 1);
 }
 
-std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+std::string first_line_of(const std::string& text) { return text.substr(0, text.find('\n')); }
 
 void check_size(const OIIO::ImageSpec& spec, const std::string& name) {
   const bool good = spec.width > 0 && spec.height > 0 && spec.depth <= 1 && spec.nchannels > 0 &&
@@ -65,7 +65,7 @@ std::vector<T> read_rgba(OIIO::ImageInput& input, OIIO::TypeDesc type, T opaque,
   const std::size_t pixels = static_cast<std::size_t>(spec.width) * static_cast<std::size_t>(spec.height);
   std::vector<T> raw(pixels * static_cast<std::size_t>(channels));
   if (!input.read_image(0, 0, 0, channels, type, raw.data())) {
-    const std::string reason = first_line(input.geterror());
+    const std::string reason = first_line_of(input.geterror());
     throw Error(fmt::format("{}: the image is damaged ({})", name, reason));
   }
   if (channels == 4) return raw;
@@ -94,7 +94,7 @@ Image8or32 decode_image(std::span<const unsigned char> file, const std::string& 
   config.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &proxy);
   const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::open("memory." + extension, &config);
   if (!input)
-    throw Error(fmt::format("{}: cannot be read as an image ({})", name, first_line(OIIO::geterror())));
+    throw Error(fmt::format("{}: cannot be read as an image ({})", name, first_line_of(OIIO::geterror())));
   input->threads(1);
   check_size(input->spec(), name);
   Image8or32 image{.name = name,

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <regex>
 
 #include "lumigrove/image.h"
 
@@ -13,8 +13,9 @@ namespace {
 
 // Numbers and commas only: anything else is a file name.
 bool is_colour(const std::string& text) {
-  static const std::regex kList("[-+0-9.eE]+(,[-+0-9.eE]+){2}");
-  return std::regex_match(text, kList);
+  return std::count(text.begin(), text.end(), ',') == 2 && text.front() != ',' && text.back() != ',' &&
+         text.find(",,") == std::string::npos &&
+         text.find_first_not_of("-+0123456789.eE,") == std::string::npos;
 }
 
 bool is_radiance(vec3 v) {
