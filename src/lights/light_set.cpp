@@ -243,10 +243,21 @@ void LightSet::gather(const SceneArrays& arrays, const SceneState& state, const 
     mean *= environment_mean_;
   }
   view_.environment_flux = mean * kPi * view_.scene_disc;
-  view_.local_flux = static_cast<float>(reduce(
-      static_cast<int>(emitters_.size()), 0.0,
-      [&](int i) { return static_cast<double>(emitter_flux(view_, static_cast<std::uint32_t>(i))); },
-      [](double a, double b) { return a + b; }));
+  struct Sums {
+    double flux = 0;
+    Box3 bounds;
+  };
+  const Sums sums = reduce(
+      static_cast<int>(emitters_.size()), Sums{},
+      [&](int i) {
+        const std::uint32_t e = static_cast<std::uint32_t>(i);
+        return Sums{static_cast<double>(emitter_flux(view_, e)), emitter_bounds(emitters_[e])};
+      },
+      [](const Sums& a, const Sums& b) {
+        return Sums{a.flux + b.flux, unite(a.bounds, b.bounds)};
+      });
+  view_.local_flux = static_cast<float>(sums.flux);
+  view_.bounds = sums.bounds;
   gather_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 

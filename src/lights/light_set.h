@@ -76,6 +76,7 @@ struct LightView {
   std::span<const PunctualView> punctual;
   std::span<const DirectionalView> directional;
   EnvironmentView environment;
+  Box3 bounds;                 // of the local emitters
   float local_flux = 0;        // Y, sum over emitters
   float environment_flux = 0;  // Y, through the scene's bounding sphere
   float scene_disc = 0;        // m^2, cross-section of the scene's bounding sphere

@@ -4,7 +4,6 @@
 #include <chrono>
 
 #include "device/device.h"
-#include "device/reduce.h"
 #include "lumigrove/error.h"
 #include "methods/light_tree/light_tree_build_kernel.h"
 
@@ -18,11 +17,8 @@ void LightTree::build(const LightView& lights, const Options& options) {
   // Not below the smallest distance whose square a float resolves against the scene.
   view_.inside2 = std::max(1e-14f * lights.diagonal * lights.diagonal, 1e-30f);
 
-  const Box3 bounds = reduce(
-      emitters, Box3{}, [&](int i) { return emitter_bounds(lights.emitters[static_cast<std::size_t>(i)]); },
-      [](Box3 a, Box3 b) { return unite(a, b); });
   keys_.resize(static_cast<std::size_t>(emitters));
-  launch(emitters, MortonKernel{lights, bounds.lo, inverse_extent(bounds), keys_}, 4096);
+  launch(emitters, MortonKernel{lights, lights.bounds.lo, inverse_extent(lights.bounds), keys_}, 4096);
   radix_sort(keys_, 31, scratch_);
   const auto dropped =
       std::partition_point(keys_.begin(), keys_.end(), [](KeyIndex k) { return k.key < kDroppedKey; });

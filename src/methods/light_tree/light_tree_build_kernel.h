@@ -33,11 +33,13 @@ struct PackedCone {
   std::int8_t x = 0, y = 0, z = 0;
   std::uint8_t radius = 255;
 
-  LUMI_HD vec3 axis() const { return vec3(x, y, z) / kConeAxis; }
-  LUMI_HD float width() const { return 2 * static_cast<float>(radius) / kConeRadius; }
+  LUMI_HD vec3 axis() const { return vec3(x, y, z) * (1 / kConeAxis); }
+  LUMI_HD float width() const { return static_cast<float>(radius) * (2 / kConeRadius); }
 };
 
-// |axis| <= 1, not exactly stored: `radius` is to be measured from PackedCone::axis().
+// |axis| <= 1. Stored to within kPackedAxisError, so `radius` is to be measured from PackedCone::axis(), or that much
+// larger.
+inline constexpr float kPackedAxisError = 0.8661f / kConeAxis;  // half a unit in each of three components
 LUMI_HD inline PackedCone pack_axis(vec3 axis) {
   const auto pack = [](float v) { return static_cast<std::int8_t>(v * kConeAxis + (v < 0 ? -0.5f : 0.5f)); };
   return {pack(axis.x), pack(axis.y), pack(axis.z), 0};
@@ -76,7 +78,7 @@ LUMI_HD inline void store_child(LightNode<W>& node, int c, const NodeChild& chil
 LUMI_HD inline NodeChild emitter_child(const LightView& lights, std::uint32_t e, float inverse_flux) {
   const NormalCone cone = emission_cone(lights, lights.emitters[e]);
   PackedCone packed = pack_axis(cone.axis);
-  packed.radius = pack_radius(cone.radius + glm::length(cone.axis - packed.axis()));
+  packed.radius = pack_radius(cone.radius + kPackedAxisError);
   return {emitter_bounds(lights.emitters[e]), emitter_intensity(lights, e) * inverse_flux, packed};
 }
 
