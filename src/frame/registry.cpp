@@ -315,7 +315,7 @@ void check_view(const ViewSettings& view) {
 const std::vector<PresetInfo>& presets() {
   static const std::vector<PresetInfo> table = {
       {"tree",
-       "Perfect light tree walked from its root with min/max-distance weights; direct light only",
+       "Perfect light tree walked from its root with min/max-distance weights and cones of normals; direct light only",
        "D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts. Proc. ACM Comput. Graph. Interact. Tech. 3(1), "
        "2020, "
        "sections 3.1 and 3.2",
