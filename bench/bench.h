@@ -4,11 +4,12 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "base/stopwatch.h"
 
 namespace lumigrove::bench {
 
@@ -49,9 +50,9 @@ inline double median(std::vector<double> values) {
 
 template <class Function>
 double time_ms(const Function& function) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   function();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  return watch.ms();
 }
 
 template <class Function>

@@ -3,20 +3,18 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <chrono>
-
+#include "base/stopwatch.h"
 #include "frame/settings_file.h"
 #include "scene/set_environment.h"
 
 namespace lumigrove {
 
 Scene open_scene(const std::string& name, const std::string& environment) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   Scene scene = load_scene(name);
   if (!environment.empty()) set_environment(scene, environment);
-  const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
   spdlog::info("loaded '{}' in {:.1f} ms: {} nodes, {} meshes, {} materials, {} lights", name,
-               elapsed.count(), scene.nodes.size(), scene.meshes.size(), scene.materials.size(),
+               watch.ms(), scene.nodes.size(), scene.meshes.size(), scene.materials.size(),
                scene.lights.size());
   for (const std::string& warning : scene.warnings) spdlog::warn("{}", warning);
   return scene;

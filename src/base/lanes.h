@@ -28,6 +28,7 @@ namespace lumigrove {
 #else
 #define LUMI_ALWAYS_INLINE [[gnu::always_inline]] inline
 #endif
+
 // Starts loading a cache line that will be read soon. To be called from inlined functions only: GCC drops calls of a
 // function that does nothing else.
 LUMI_HD LUMI_ALWAYS_INLINE void prefetch(const void* address) {

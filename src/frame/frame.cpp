@@ -7,10 +7,10 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/rng.h"
+#include "base/stopwatch.h"
 #include "device/device.h"
 #include "frame/camera.h"
 #include "frame/emission_kernel.h"
@@ -19,12 +19,6 @@
 
 namespace lumigrove {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 // --- one tile ----------------------------------------------------------------------------------------------
 
@@ -61,9 +55,8 @@ std::vector<PixelWindow> make_tiles(const PixelWindow& window) {
 // Runs `step` and adds its wall time to `ms`.
 template <class Step>
 void timed(double& ms, const Step& step) {
-  const auto start = Clock::now();
+  const ScopedTimer timer(ms);
   step();
-  ms += milliseconds_since(start);
 }
 
 // Paths go on from the first hits as settings.indirect asks; with MIS their first ray also finds direct light.
@@ -142,10 +135,10 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   SceneState state = evaluate(scene, settings.time);
   SceneArrays arrays(scene);
   arrays.set_state(state);
-  const auto start = Clock::now();
+  const Stopwatch watch;
   Tracer tracer(scene, state);
   stats.structures.push_back(
-      {kAccelerationStructure, milliseconds_since(start), tracer.bytes(), state.instances.size()});
+      {kAccelerationStructure, watch.ms(), tracer.bytes(), state.instances.size()});
   LightSet lights(scene, arrays);
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
@@ -166,13 +159,13 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
         {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
   }
   if (settings.direct.selection == Selection::kPower) {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     std::vector<float> flux(lights.emitters.size());
     launch(static_cast<int>(flux.size()), [&](int i) {
       flux[static_cast<std::size_t>(i)] = emitter_flux(lights, static_cast<std::uint32_t>(i));
     });
     world.alias.build(flux);
-    stats.structures.push_back({"alias table", milliseconds_since(start), world.alias.bytes(), flux.size()});
+    stats.structures.push_back({"alias table", watch.ms(), world.alias.bytes(), flux.size()});
   }
 }
 
@@ -264,15 +257,15 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
                                   static_cast<std::size_t>(threads));
   tbb::task_arena arena(threads);
   return arena.execute([&] {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     const std::unique_ptr<World> world = make_world(scene, settings, result);
     Film film(settings.width, settings.height);
     for (int sample = 0; sample < settings.spp; ++sample) {
       render_sample(*world, settings, sample, film, result);
       result.spp_done = sample + 1;
-      if (progress && !progress({result.spp_done, settings.spp, milliseconds_since(start) * 1e-3})) break;
+      if (progress && !progress({result.spp_done, settings.spp, watch.ms() * 1e-3})) break;
     }
-    result.total_ms = milliseconds_since(start);
+    result.total_ms = watch.ms();
     return develop(film, result.spp_done);
   });
 }

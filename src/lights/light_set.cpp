@@ -1,9 +1,9 @@
 #include "lights/light_set.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
+#include "base/stopwatch.h"
 #include "device/device.h"
 #include "device/reduce.h"
 #include "lights/emitter.h"
@@ -165,7 +165,7 @@ void LightSet::build_environment(const SceneArrays& arrays) {
 }
 
 void LightSet::gather(const SceneArrays& arrays, const SceneState& state, const Settings& settings) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const SceneView scene = arrays.view();
   punctual_.clear();
   directional_.clear();
@@ -258,7 +258,7 @@ void LightSet::gather(const SceneArrays& arrays, const SceneState& state, const 
       });
   view_.local_flux = static_cast<float>(sums.flux);
   view_.bounds = sums.bounds;
-  gather_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  gather_ms_ = watch.ms();
 }
 
 LightView LightSet::view() const { return view_; }

@@ -1,32 +1,27 @@
 #include "methods/light_sampling/direct_lighting.h"
 
-#include <chrono>
-
+#include "base/stopwatch.h"
 #include "device/device.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 
 namespace lumigrove {
 namespace {
 
-double milliseconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
 void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
                     std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
                     std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   const int count = static_cast<int>(surfaces.size());
-  auto start = std::chrono::steady_clock::now();
-  launch(walk_batches(count),
-         DirectLightKernel{sampler, lighting.rng, dimension, 1.0f / static_cast<float>(lighting.spp), lighting.mis,
-                           surfaces, pixels, buffers.shadow, buffers.contribution},
-         kLaunchGrain / kWalkBatch);
-  buffers.select_ms += milliseconds_since(start);
-
-  start = std::chrono::steady_clock::now();
-  lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
-  buffers.trace_ms += milliseconds_since(start);
-
+  {
+    const ScopedTimer timer(buffers.select_ms);
+    launch(walk_batches(count),
+           DirectLightKernel{sampler, lighting.rng, dimension, 1.0f / static_cast<float>(lighting.spp), lighting.mis,
+                             surfaces, pixels, buffers.shadow, buffers.contribution},
+           kLaunchGrain / kWalkBatch);
+  }
+  {
+    const ScopedTimer timer(buffers.trace_ms);
+    lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
+  }
   for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
   launch(count, AddUnoccludedKernel{buffers.contribution, buffers.occluded, sum});
 }

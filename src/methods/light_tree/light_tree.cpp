@@ -1,8 +1,8 @@
 #include "methods/light_tree/light_tree.h"
 
 #include <algorithm>
-#include <chrono>
 
+#include "base/stopwatch.h"
 #include "device/device.h"
 #include "lumigrove/error.h"
 #include "methods/light_tree/light_tree_build_kernel.h"
@@ -10,7 +10,7 @@
 namespace lumigrove {
 
 void LightTree::build(const LightView& lights, const Options& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const int emitters = static_cast<int>(lights.emitters.size());
   view_ = {};
   view_.width = options.width;
@@ -44,7 +44,7 @@ void LightTree::build(const LightView& lights, const Options& options) {
       throw Error("a light tree has 2, 4, 8 or 16 children a node, not " + std::to_string(options.width));
   }
   if (!options.cones) view_.first_cones = view_.levels;
-  build_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  build_ms_ = watch.ms();
 }
 
 template <int W>

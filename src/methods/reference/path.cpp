@@ -1,28 +1,13 @@
 #include "methods/reference/path.h"
 
 #include <algorithm>
-#include <chrono>
 
+#include "base/stopwatch.h"
 #include "device/compact.h"
 #include "device/device.h"
 
 namespace lumigrove {
 namespace {
-
-// Adds the time since its construction to a counter.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& ms) : ms_(ms), start_(std::chrono::steady_clock::now()) {}
-  ~Stopwatch() {
-    ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
-  }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& ms_;
-  std::chrono::steady_clock::time_point start_;
-};
 
 // One batch of paths with everything that its steps share.
 struct Batch {
@@ -56,7 +41,7 @@ int start(const Batch& batch, std::span<const Surface> first) {
 
 void scatter(const Batch& batch, int count, int ray_number) {
   PathBuffers& b = batch.buffers;
-  const Stopwatch watch(b.scatter_ms);
+  const ScopedTimer timer(b.scatter_ms);
   b.rays.resize(b.paths.size());
   launch(count, PathScatterKernel{b.surfaces, batch.pixels, batch.tracing.lighting.rng, ray_number,
                                   batch.tracing.roulette_start, b.paths, b.rays});
@@ -66,7 +51,7 @@ void scatter(const Batch& batch, int count, int ray_number) {
 
 void trace(const Batch& batch) {
   PathBuffers& b = batch.buffers;
-  const Stopwatch watch(b.trace_ms);
+  const ScopedTimer timer(b.trace_ms);
   b.hits.resize(b.rays.size());
   batch.tracing.lighting.tracer->closest(b.rays, b.hits, Coherence::kIncoherent);
 }
@@ -74,7 +59,7 @@ void trace(const Batch& batch) {
 // Escapes and emission, then the packed vertices that the rays arrived at. Returns their number.
 int arrive(const Batch& batch, int count, int ray_number) {
   PathBuffers& b = batch.buffers;
-  const Stopwatch watch(b.arrive_ms);
+  const ScopedTimer timer(b.arrive_ms);
   const LightSampler& sampler = batch.tracing.lighting.sampler;
   const std::span<vec3> film = batch.film(ray_number);
   if (batch.finds_emitters() && sampler.lights.environment.present())
