@@ -18,7 +18,11 @@ namespace lumigrove {
 enum class Hierarchy : std::uint8_t { kNone, kPerfect };
 enum class Weights : std::uint8_t { kMinMax };
 enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll };
-enum class Transport : std::uint8_t { kNone, kPath };
+enum class Transport : std::uint8_t { kNone, kPath, kVpl };
+enum class IndirectHierarchy : std::uint8_t { kNone, kSubstitute };
+enum class Topology : std::uint8_t { kRadix, kPerfect };
+enum class IndirectWeights : std::uint8_t { kDistanceBounded, kInBox, kYuksel };
+enum class Stop : std::uint8_t { kLeaf, kSubstitute };
 
 // Light that reaches a surface straight from an emitter.
 struct DirectSettings {
@@ -31,11 +35,34 @@ struct DirectSettings {
   bool mis = false;             // combine with BSDF sampling (balance heuristic)
 };
 
-// Light that reaches a surface from other surfaces.
+// Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D.
 struct IndirectSettings {
   Transport transport = Transport::kNone;
-  int max_bounces = 4;          // indirect bounces; 0 = none
+  int max_bounces = 4;          // kPath: indirect bounces; 0 = none
   int roulette_start = 3;       // first bounce that Russian roulette may end
+  // Virtual point lights (kVpl)
+  int vpls = 100000;            // most lights: paths times bounces
+  int bounces = 3;              // lights that one path leaves at most; 1 = first bounce only
+  bool keep_vpls = false;       // the same lights for every camera sample; otherwise new ones for each
+  float clamp = 215;            // G_max: most of cos / d^2, in units of 1 / D^2; 0 = no clamp
+  // How they are chosen
+  Selection selection = Selection::kRoot;
+  IndirectHierarchy hierarchy = IndirectHierarchy::kSubstitute;  // needed by kRoot
+  Topology topology = Topology::kRadix;
+  IndirectWeights weights = IndirectWeights::kDistanceBounded;
+  float distance_floor = 0.048f;  // epsilon: least distance in the weights, kDistanceBounded
+  bool cones = false;           // weights also bound the cosine at the lights
+  bool gloss = true;            // gloss lobes are lit too, by walks of their own
+  int spp = 1;                  // samples for each camera sample
+  // Substitutes
+  Stop stop = Stop::kSubstitute;
+  float min_nu = 0.5f;          // nu_min: least agreement of normals
+  float max_sigma = 0.0216f;    // sigma_max: most deviation along the normal
+  float max_diagonal = 0;       // tau_max: most diagonal of the lights' box; 0 = any
+  float correction = 0;         // probability of correcting a substitute by a leaf; above 0: no bias
+  // Beyond the trees
+  float mirror_roughness = 0;   // gloss of surfaces at most this rough goes on by one ray; 0 = none
+  bool compensate = false;      // light lost to the clamp is found by one short ray
 };
 
 struct ViewSettings {           // replaces the scene's camera when set (Embree's names)

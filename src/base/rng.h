@@ -31,6 +31,8 @@ enum Dimension : std::uint32_t {
   kDimLight = 4,    // light selection (1), point on the light (2), spare (1); +4 per further light sample
   kDimBsdf = 2048,  // lobe (1), direction (2), roulette (1)
   kDimensionsPerVertex = 4096,
+  kDimVpl = 1u << 28,       // tracing of virtual point lights: emission first, then 4 for every bounce
+  kDimIndirect = 1u << 29,  // sampling of virtual point lights: 12 for each sample
 };
 
 // Random numbers of one pixel of one frame. `dimension` counts single floats; blocks of four share one hash.

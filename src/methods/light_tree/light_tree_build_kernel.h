@@ -28,28 +28,6 @@ struct MortonKernel {
   }
 };
 
-// A cone as nodes store it.
-struct PackedCone {
-  std::int8_t x = 0, y = 0, z = 0;
-  std::uint8_t radius = 255;
-
-  LUMI_HD vec3 axis() const { return vec3(x, y, z) * (1 / kConeAxis); }
-  LUMI_HD float width() const { return static_cast<float>(radius) * (2 / kConeRadius); }
-};
-
-// |axis| <= 1. Stored to within kPackedAxisError, so `radius` is to be measured from PackedCone::axis(), or that much
-// larger.
-inline constexpr float kPackedAxisError = 0.8661f / kConeAxis;  // half a unit in each of three components
-LUMI_HD inline PackedCone pack_axis(vec3 axis) {
-  const auto pack = [](float v) { return static_cast<std::int8_t>(v * kConeAxis + (v < 0 ? -0.5f : 0.5f)); };
-  return {pack(axis.x), pack(axis.y), pack(axis.z), 0};
-}
-
-// Rounded up, with enough for the roundings of a walk's dot products.
-LUMI_HD inline std::uint8_t pack_radius(float radius) {
-  return static_cast<std::uint8_t>(glm::clamp(glm::ceil((radius + 1e-4f) * (0.5f * kConeRadius)), 0.0f, kConeRadius));
-}
-
 struct NodeChild {
   Box3 box;
   float intensity = 0;

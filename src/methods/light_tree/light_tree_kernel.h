@@ -28,6 +28,7 @@
 
 #include "base/lanes.h"
 #include "base/vec.h"
+#include "lights/packed_cone.h"
 
 namespace lumigrove {
 
@@ -52,7 +53,6 @@ struct alignas(W * sizeof(float)) LightNode {
   std::int8_t axis_x[W], axis_y[W], axis_z[W];  // in units of 1/kConeAxis
   std::uint8_t radius[W];                       // in units of 2/kConeRadius
 };
-inline constexpr float kConeAxis = 127, kConeRadius = 255;
 
 struct LightTreeView {
   const std::byte* nodes = nullptr;              // LightNode<width>, level by level from the root
