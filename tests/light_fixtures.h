@@ -10,7 +10,7 @@
 #include "base/rng.h"
 #include "base/sampling.h"
 #include "lights/light_set.h"
-#include "methods/light_sampling/alias_table.h"
+#include "lights/alias_table.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/light_tree/light_tree.h"
 #include "scene/scene_view.h"

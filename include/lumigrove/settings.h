@@ -63,6 +63,7 @@ struct IndirectSettings {
   // Beyond the trees
   float mirror_roughness = 0;   // gloss of surfaces at most this rough goes on by one ray; 0 = none
   bool compensate = false;      // light lost to the clamp is found by one short ray
+  bool show = false;            // layers that show the walks
 };
 
 struct ViewSettings {           // replaces the scene's camera when set (Embree's names)

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 #include "base/vec.h"
 
@@ -36,6 +37,13 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch(const void* address) {
   __builtin_prefetch(address);
 #else
   (void)address;
+#endif
+}
+
+// What was stored is loaded again: GCC would rather take lanes out of a register one by one, at two operations each.
+LUMI_HD LUMI_ALWAYS_INLINE void forget_registers() {
+#if LUMI_VECTOR_LANES
+  asm volatile("" ::: "memory");
 #endif
 }
 
@@ -118,6 +126,63 @@ inline Lanes<W> keep_if_not_above(Lanes<W> x, Lanes<W> y, Lanes<W> a) {
 template <int W>
 inline Lanes<W> choose_where_greater(Lanes<W> a, Lanes<W> b, Lanes<W> x, Lanes<W> y) {
   return a > b ? x : y;
+}
+
+// The bits of every lane as a whole number, and back.
+template <int W>
+using IntLanes = typename LaneTypes<W>::Ints;
+
+template <int W>
+inline IntLanes<W> broadcast_int(std::int32_t i) {
+  return i - IntLanes<W>{};
+}
+template <int W>
+inline IntLanes<W> bits_of(Lanes<W> a) {
+  return (IntLanes<W>)a;
+}
+template <int W>
+inline Lanes<W> from_bits(IntLanes<W> bits) {
+  return (Lanes<W>)bits;
+}
+// As signed numbers, rounded to nearest above 2^24.
+template <int W>
+inline Lanes<W> to_float(IntLanes<W> a) {
+  return __builtin_convertvector(a, Lanes<W>);
+}
+template <int W>
+inline IntLanes<W> load_lanes(const std::uint32_t* from) {
+  IntLanes<W> lanes;
+  std::memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+template <int W>
+inline void store_lanes(IntLanes<W> lanes, std::uint32_t* to) {
+  std::memcpy(to, &lanes, sizeof lanes);
+}
+template <int W>
+inline IntLanes<W> choose_where_greater(Lanes<W> a, Lanes<W> b, IntLanes<W> x, IntLanes<W> y) {
+  return a > b ? x : y;
+}
+
+// Rows i and i + kStride exchange their columns c and c + kStride, for all i and c without the bit kStride.
+template <int W, int kStride, int... c>
+LUMI_ALWAYS_INLINE void exchange_columns(Lanes<W>* rows, std::integer_sequence<int, c...>) {
+  constexpr IntLanes<W> low{((c & kStride) != 0 ? W + c - kStride : c)...};
+  constexpr IntLanes<W> high{((c & kStride) != 0 ? W + c : c + kStride)...};
+#pragma GCC unroll 16
+  for (int i = 0; i < W; ++i) {
+    if ((i & kStride) != 0) continue;
+    const Lanes<W> a = rows[i], b = rows[i + kStride];
+    rows[i] = __builtin_shuffle(a, b, low);
+    rows[i + kStride] = __builtin_shuffle(a, b, high);
+  }
+}
+
+// rows[i][c] <-> rows[c][i], for W rows.
+template <int W, int kStride = 1>
+LUMI_ALWAYS_INLINE void transpose_lanes(Lanes<W>* rows) {
+  exchange_columns<W, kStride>(rows, std::make_integer_sequence<int, W>());
+  if constexpr (2 * kStride < W) transpose_lanes<W, 2 * kStride>(rows);
 }
 
 // All of a or all of b, without a branch.
@@ -283,6 +348,80 @@ template <int W>
 LUMI_HD inline Lanes<W> choose_where_greater(const Lanes<W>& a, const Lanes<W>& b, const Lanes<W>& x,
                                              const Lanes<W>& y) {
   return make_lanes<W>([&](int c) { return a[c] > b[c] ? x[c] : y[c]; });
+}
+
+template <int W>
+struct IntLanes {
+  std::int32_t value[W];
+  LUMI_HD std::int32_t& operator[](int c) { return value[c]; }
+  LUMI_HD std::int32_t operator[](int c) const { return value[c]; }
+};
+
+template <int W, class Value>
+LUMI_HD inline IntLanes<W> make_int_lanes(const Value& value) {
+  IntLanes<W> lanes;
+  for (int c = 0; c < W; ++c) lanes[c] = value(c);
+  return lanes;
+}
+
+#define LUMI_LANE_OPERATOR(op)                                                          \
+  template <int W>                                                                      \
+  LUMI_HD inline IntLanes<W> operator op(const IntLanes<W>& a, const IntLanes<W>& b) {  \
+    return make_int_lanes<W>([&](int c) { return a[c] op b[c]; });                      \
+  }                                                                                     \
+  template <int W>                                                                      \
+  LUMI_HD inline IntLanes<W> operator op(const IntLanes<W>& a, std::int32_t b) {        \
+    return make_int_lanes<W>([&](int c) { return a[c] op b; });                         \
+  }
+LUMI_LANE_OPERATOR(+)
+LUMI_LANE_OPERATOR(&)
+LUMI_LANE_OPERATOR(|)
+LUMI_LANE_OPERATOR(<<)
+LUMI_LANE_OPERATOR(>>)
+#undef LUMI_LANE_OPERATOR
+
+template <int W>
+LUMI_HD inline IntLanes<W> broadcast_int(std::int32_t i) {
+  return make_int_lanes<W>([&](int) { return i; });
+}
+template <int W>
+LUMI_HD inline IntLanes<W> bits_of(const Lanes<W>& a) {
+  IntLanes<W> bits;
+  std::memcpy(&bits, &a, sizeof bits);
+  return bits;
+}
+template <int W>
+LUMI_HD inline Lanes<W> from_bits(const IntLanes<W>& bits) {
+  Lanes<W> a;
+  std::memcpy(&a, &bits, sizeof a);
+  return a;
+}
+template <int W>
+LUMI_HD inline Lanes<W> to_float(const IntLanes<W>& a) {
+  return make_lanes<W>([&](int c) { return static_cast<float>(a[c]); });
+}
+template <int W>
+LUMI_HD inline IntLanes<W> load_lanes(const std::uint32_t* from) {
+  return make_int_lanes<W>([&](int c) { return static_cast<std::int32_t>(from[c]); });
+}
+template <int W>
+LUMI_HD inline void store_lanes(const IntLanes<W>& lanes, std::uint32_t* to) {
+  std::memcpy(to, &lanes, sizeof lanes);
+}
+template <int W>
+LUMI_HD inline IntLanes<W> choose_where_greater(const Lanes<W>& a, const Lanes<W>& b, const IntLanes<W>& x,
+                                                const IntLanes<W>& y) {
+  return make_int_lanes<W>([&](int c) { return a[c] > b[c] ? x[c] : y[c]; });
+}
+
+template <int W>
+LUMI_HD inline void transpose_lanes(Lanes<W>* rows) {
+  for (int i = 0; i < W; ++i)
+    for (int c = 0; c < i; ++c) {
+      const float other = rows[c][i];
+      rows[c][i] = rows[i][c];
+      rows[i][c] = other;
+    }
 }
 
 template <int W>

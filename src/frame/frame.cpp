@@ -33,6 +33,7 @@ struct TileBuffers {
   std::vector<vec3> direct, indirect, emission;
   DirectBuffers direct_buffers;
   PathBuffers path_buffers;
+  IndirectBuffers indirect_buffers;
   double camera_ms = 0, primary_ms = 0, surface_ms = 0, film_ms = 0;
   std::uint64_t primary_rays = 0;
 };
@@ -74,7 +75,7 @@ PathTracing make_path_tracing(const Settings& settings, const DirectLighting& di
 
 // G-buffer · direct light · indirect light · film, for the pixels of one tile.
 void light_tile(const World& world, const Settings& settings, const DirectLighting& direct,
-                const CameraView& camera, const PixelWindow& tile, int sample, TileBuffers& b, Film& film) {
+                const IndirectLighting& indirect, const CameraView& camera, const PixelWindow& tile, int sample, TileBuffers& b, Film& film) {
   const int count = tile.count();
   const std::size_t n = static_cast<std::size_t>(count);
   const SceneView scene = world.arrays.view();
@@ -102,6 +103,8 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
   add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, direct), b.surfaces, b.pixels, b.path_buffers, b.direct,
                  b.indirect);
+  if (settings.indirect.transport == Transport::kVpl)
+    add_indirect_light(indirect, b.surfaces, b.pixels, kDimIndirect, b.indirect_buffers, b.indirect);
 
   timed(b.film_ms, [&] {
     launch(count, FilmKernel{sample,
@@ -115,9 +118,24 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
   });
 }
 
-// Adds what each thread measured, as wall time: the threads' sum over their number.
-void add_pass(RenderStats& stats, const char* name, double thread_ms, std::uint64_t rays) {
-  const double ms = thread_ms / tbb::this_task_arena::max_concurrency();
+// Frame and seed together key the hash's seed; camera samples count in its frame slot.
+Rng frame_rng(const Settings& settings, int sample) {
+  const uvec4 key = pcg4d(uvec4(settings.seed, static_cast<std::uint32_t>(settings.frame), 0, 0));
+  return {key.x, static_cast<std::uint32_t>(sample), 0};
+}
+
+// A structure that is made anew for every camera sample: its latest figures.
+void set_structure(RenderStats& stats, const StructureStats& structure) {
+  for (StructureStats& known : stats.structures)
+    if (known.name == structure.name) {
+      known = structure;
+      return;
+    }
+  stats.structures.push_back(structure);
+}
+
+// A pass by the wall clock.
+void add_pass_ms(RenderStats& stats, const char* name, double ms, std::uint64_t rays) {
   for (PassStats& pass : stats.passes) {
     if (pass.name != name) continue;
     pass.ms += ms;
@@ -126,6 +144,14 @@ void add_pass(RenderStats& stats, const char* name, double thread_ms, std::uint6
   }
   stats.passes.push_back({name, ms, rays});
 }
+
+// Adds what each thread measured, as wall time: the threads' sum over their number.
+void add_pass(RenderStats& stats, const char* name, double thread_ms, std::uint64_t rays) {
+  add_pass_ms(stats, name, thread_ms / tbb::this_task_arena::max_concurrency(), rays);
+}
+
+// Shadow rays leave a substitute through this much of its surroundings, in units of D: it may lie inside geometry.
+constexpr float kSubstituteOffset = 2.2e-3f;
 
 }  // namespace
 
@@ -142,7 +168,7 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   LightSet lights(scene, arrays);
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
-      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, std::move(camera)});
+      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, std::move(camera), {}, {}, {}});
   build_lights(*world, settings, stats);
   return world;
 }
@@ -169,6 +195,66 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   }
 }
 
+void trace_vpls(World& world, const Settings& settings, int sample, RenderStats& stats) {
+  const IndirectSettings& indirect = settings.indirect;
+  if (indirect.transport != Transport::kVpl || (indirect.keep_vpls && sample > 0)) return;
+  VplTracing tracing;
+  tracing.scene = world.arrays.view();
+  tracing.lights = world.lights.view();
+  tracing.bounds = world.state.bounds;
+  tracing.tracer = &world.tracer;
+  tracing.rng = frame_rng(settings, sample);
+  tracing.paths = std::max(1, indirect.vpls / indirect.bounces);
+  tracing.bounces = indirect.bounces;
+  tracing.roulette_start = indirect.roulette_start;
+  tracing.force_diffuse = settings.force_diffuse;
+  world.vpls.trace(tracing);
+  const VplView vpls = world.vpls.view();
+  add_pass_ms(stats, "VPL paths", world.vpls.trace_ms(), world.vpls.rays());
+  set_structure(stats, {"VPLs", world.vpls.trace_ms(), world.vpls.bytes(), vpls.vpls.size()});
+  if (indirect.selection == Selection::kRoot) {
+    const float d = vpls.diagonal;
+    world.substitutes.build(vpls, {indirect.topology, indirect.min_nu, indirect.max_sigma * d,
+                                   indirect.max_diagonal > 0 ? indirect.max_diagonal * d : kInfinity});
+    set_structure(stats, {"substitute tree", world.substitutes.build_ms(), world.substitutes.bytes(),
+                          world.substitutes.view().count});
+  }
+  if (indirect.selection == Selection::kPower) {
+    const Stopwatch watch;
+    std::vector<float> power(vpls.vpls.size());
+    for (std::size_t i = 0; i < power.size(); ++i) power[i] = luminance(vpls.vpls[i].intensity);
+    world.vpl_alias.build(power);
+    set_structure(stats, {"VPL alias table", watch.ms(), world.vpl_alias.bytes(), power.size()});
+  }
+}
+
+IndirectLighting make_indirect_lighting(const World& world, const Settings& settings, int sample) {
+  const IndirectSettings& s = settings.indirect;
+  IndirectLighting indirect;
+  if (s.transport != Transport::kVpl) return indirect;
+  VplSampler& sampler = indirect.sampler;
+  sampler.lights = world.vpls.view();
+  const float d = sampler.lights.diagonal;
+  sampler.alias = world.vpl_alias.view();
+  sampler.walk.tree = world.substitutes.view();
+  sampler.walk.weight = s.weights;
+  sampler.walk.floor2 = std::max(s.distance_floor * s.distance_floor, 1e-14f) * d * d;
+  sampler.walk.cones = s.cones;
+  sampler.walk.substitutes = s.stop == Stop::kSubstitute;
+  sampler.choice = s.selection == Selection::kRoot    ? VplChoice::kTree
+                   : s.selection == Selection::kPower ? VplChoice::kPower
+                                                      : VplChoice::kUniform;
+  sampler.clamp = s.clamp > 0 ? s.clamp / (d * d) : kInfinity;
+  sampler.substitute_offset = kSubstituteOffset * d;
+  sampler.correction = s.correction;
+  sampler.gloss = s.gloss;
+  indirect.all = s.selection == Selection::kAll;
+  indirect.tracer = &world.tracer;
+  indirect.rng = frame_rng(settings, sample);
+  indirect.spp = s.spp;
+  return indirect;
+}
+
 DirectLighting make_direct_lighting(const World& world, const Settings& settings, int sample) {
   DirectLighting direct;
   direct.sampler.scene = world.arrays.view();
@@ -190,10 +276,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
       break;
   }
   direct.tracer = &world.tracer;
-  // Frame and seed together key the hash's seed; camera samples count in its frame slot.
-  const uvec4 key = pcg4d(uvec4(settings.seed, static_cast<std::uint32_t>(settings.frame), 0, 0));
-  direct.rng.seed = key.x;
-  direct.rng.frame = static_cast<std::uint32_t>(sample);
+  direct.rng = frame_rng(settings, sample);
   direct.spp = settings.direct.spp;
   direct.mis = settings.direct.mis;
   return direct;
@@ -204,6 +287,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
 void render_sample(const World& world, const Settings& settings, int sample, Film& film, RenderStats& stats) {
   const CameraView camera = make_camera_view(world.camera, settings.width, settings.height);
   const DirectLighting direct = make_direct_lighting(world, settings, sample);
+  const IndirectLighting indirect = make_indirect_lighting(world, settings, sample);
   const std::vector<PixelWindow> tiles = make_tiles(crop_window(settings));
   tbb::enumerable_thread_specific<TileBuffers> buffers;
 
@@ -213,7 +297,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
         // Isolated: while a tile waits for its own inner loops it must not start another tile in the same
         // buffers.
         tbb::this_task_arena::isolate([&] {
-          light_tile(world, settings, direct, camera, tiles[static_cast<std::size_t>(i)], sample,
+          light_tile(world, settings, direct, indirect, camera, tiles[static_cast<std::size_t>(i)], sample,
                      buffers.local(), film);
         });
       },
@@ -230,6 +314,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     sum.direct_buffers.trace_ms += b.direct_buffers.trace_ms;
     sum.direct_buffers.rays += b.direct_buffers.rays;
     sum.path_buffers.add_counters(b.path_buffers);
+    sum.indirect_buffers.add_counters(b.indirect_buffers);
   }
   add_pass(stats, "camera rays", sum.camera_ms, 0);
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
@@ -242,6 +327,10 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     add_pass(stats, "path surfaces", path.scatter_ms + path.arrive_ms, 0);
     add_pass(stats, "path light selection", path.direct.select_ms, 0);
     add_pass(stats, "path shadow rays", path.direct.trace_ms, path.direct.rays);
+  }
+  if (settings.indirect.transport == Transport::kVpl) {
+    add_pass(stats, "VPL selection", sum.indirect_buffers.select_ms, 0);
+    add_pass(stats, "VPL shadow rays", sum.indirect_buffers.trace_ms, sum.indirect_buffers.rays);
   }
   add_pass(stats, "film", sum.film_ms, 0);
 }
@@ -261,6 +350,7 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
     const std::unique_ptr<World> world = make_world(scene, settings, result);
     Film film(settings.width, settings.height);
     for (int sample = 0; sample < settings.spp; ++sample) {
+      trace_vpls(*world, settings, sample, result);
       render_sample(*world, settings, sample, film, result);
       result.spp_done = sample + 1;
       if (progress && !progress({result.spp_done, settings.spp, watch.ms() * 1e-3})) break;

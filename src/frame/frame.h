@@ -7,9 +7,12 @@
 #include "frame/film.h"
 #include "lights/light_set.h"
 #include "lumigrove/renderer.h"
-#include "methods/light_sampling/alias_table.h"
+#include "lights/alias_table.h"
 #include "methods/light_sampling/direct_lighting.h"
 #include "methods/light_tree/light_tree.h"
+#include "methods/substitute_tree/substitute_tree.h"
+#include "methods/vpl/vpl.h"
+#include "methods/vpl_sampling/indirect_lighting.h"
 #include "scene/camera_kernel.h"
 #include "scene/scene_view.h"
 #include "trace/trace.h"
@@ -26,6 +29,10 @@ struct World {
   LightTree tree;    // built when direct.hierarchy is perfect and direct.selection is root
   AliasTable alias;  // built when direct.selection is power
   CameraInstance camera;
+  // When indirect.transport is vpl:
+  VplSet vpls;
+  SubstituteTree substitutes;  // built when indirect.selection is root
+  AliasTable vpl_alias;        // built when indirect.selection is power
 };
 
 // The scene at settings.time: transforms, acceleration structure, emitters, hierarchy, camera. `scene` must
@@ -35,6 +42,13 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
 
 // Emitters and their hierarchy alone, as every frame rebuilds them.
 void build_lights(World& world, const Settings& settings, RenderStats& stats);
+
+// Virtual point lights for camera sample `sample`, and what chooses among them. Does nothing when indirect.transport is
+// not vpl, or when the lights of an earlier sample are to be kept.
+void trace_vpls(World& world, const Settings& settings, int sample, RenderStats& stats);
+
+// The sampler that settings.indirect asks for, over the world's virtual point lights.
+IndirectLighting make_indirect_lighting(const World& world, const Settings& settings, int sample);
 
 // The light sampler that settings.direct asks for, over the world's lights.
 DirectLighting make_direct_lighting(const World& world, const Settings& settings, int sample);

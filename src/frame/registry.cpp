@@ -249,8 +249,8 @@ std::vector<Setting> indirect_rows() {
   return {
       choice(
           "indirect.transport", [](auto& s) -> auto& { return s.indirect.transport; },
-          Names{{"none", Transport::kNone}, {"path", Transport::kPath}},
-          "How light from other surfaces is found"),
+          Names{{"none", Transport::kNone}, {"path", Transport::kPath}, {"vpl", Transport::kVpl}},
+          "How light from other surfaces is found: not at all, by paths, or by virtual point lights (VPLs)"),
       integer(
           "indirect.max_bounces", [](auto& s) -> auto& { return s.indirect.max_bounces; }, {0, 1024},
           "bounces", "Most indirect bounces of a path, 0 = direct light only"),
@@ -260,10 +260,92 @@ std::vector<Setting> indirect_rows() {
   };
 }
 
+// Virtual point lights: how they are traced and chosen.
+std::vector<Setting> vpl_rows() {
+  using std::pair;
+  using std::string;
+  using std::vector;
+  return {
+      integer(
+          "indirect.vpls", [](auto& s) -> auto& { return s.indirect.vpls; }, {1, 1 << 24}, "VPLs",
+          "Most VPLs: as many paths are traced from the emitters as this over indirect.bounces"),
+      integer(
+          "indirect.bounces", [](auto& s) -> auto& { return s.indirect.bounces; }, {1, 64}, "bounces",
+          "VPLs that one path leaves at most; 1 = light of one indirect bounce"),
+      flag(
+          "indirect.keep_vpls", [](auto& s) -> auto& { return s.indirect.keep_vpls; },
+          "The same VPLs serve every camera sample; otherwise new ones are traced for each"),
+      real(
+          "indirect.clamp", [](auto& s) -> auto& { return s.indirect.clamp; }, {0, kNoLimit}, "1/D^2",
+          "Most of cos/d^2 at a VPL, against bright spots around it; 0 = no clamp"),
+      choice(
+          "indirect.selection", [](auto& s) -> auto& { return s.indirect.selection; },
+          vector<pair<string, Selection>>{{"uniform", Selection::kUniform},
+                                          {"power", Selection::kPower},
+                                          {"root", Selection::kRoot},
+                                          {"all", Selection::kAll}},
+          "How VPLs are chosen: each alike, by power, walking the hierarchy from its root, or all of them"),
+      choice(
+          "indirect.hierarchy", [](auto& s) -> auto& { return s.indirect.hierarchy; },
+          vector<pair<string, IndirectHierarchy>>{{"none", IndirectHierarchy::kNone},
+                                                  {"substitute", IndirectHierarchy::kSubstitute}},
+          "Hierarchy over the VPLs"),
+      choice(
+          "indirect.topology", [](auto& s) -> auto& { return s.indirect.topology; },
+          vector<pair<string, Topology>>{{"radix", Topology::kRadix}, {"perfect", Topology::kPerfect}},
+          "Where the hierarchy splits the sorted VPLs: where their codes differ, or in the middle"),
+      choice(
+          "indirect.weights", [](auto& s) -> auto& { return s.indirect.weights; },
+          vector<pair<string, IndirectWeights>>{{"distance-bounded", IndirectWeights::kDistanceBounded},
+                                                {"in-box", IndirectWeights::kInBox},
+                                                {"yuksel", IndirectWeights::kYuksel}},
+          "Distance in the weights of a node's children: to the mean, bounded from below; the same, left out inside the "
+          "box; to the box, left out for both children when one is wider than far"),
+      real(
+          "indirect.distance_floor", [](auto& s) -> auto& { return s.indirect.distance_floor; }, {0, 1}, "D",
+          "Least distance in the weights"),
+      flag(
+          "indirect.cones", [](auto& s) -> auto& { return s.indirect.cones; },
+          "Weights also bound the cosine at the VPLs"),
+      flag(
+          "indirect.gloss", [](auto& s) -> auto& { return s.indirect.gloss; },
+          "VPLs light gloss lobes too, by walks of their own; otherwise only diffuse reflection"),
+      integer(
+          "indirect.spp", [](auto& s) -> auto& { return s.indirect.spp; }, {1, 4096}, "samples",
+          "VPL samples for each camera sample"),
+      choice(
+          "indirect.stop", [](auto& s) -> auto& { return s.indirect.stop; },
+          vector<pair<string, Stop>>{{"leaf", Stop::kLeaf}, {"substitute", Stop::kSubstitute}},
+          "Where a walk ends: at one VPL, or at the first node whose Gaussian may stand for its VPLs"),
+      real(
+          "indirect.min_nu", [](auto& s) -> auto& { return s.indirect.min_nu; }, {0, 1}, "",
+          "Least agreement of the normals below a substitute"),
+      real(
+          "indirect.max_sigma", [](auto& s) -> auto& { return s.indirect.max_sigma; }, {0, kNoLimit}, "D",
+          "Most standard deviation along the normal of a substitute"),
+      real(
+          "indirect.max_diagonal", [](auto& s) -> auto& { return s.indirect.max_diagonal; }, {0, kNoLimit}, "D",
+          "Most diagonal of a substitute's box; 0 = any"),
+      real(
+          "indirect.correction", [](auto& s) -> auto& { return s.indirect.correction; }, {0, 1}, "",
+          "Probability of correcting a substitute by one of its VPLs, at the cost of a second shadow ray; above 0 the "
+          "substitutes leave no bias"),
+      real(
+          "indirect.mirror_roughness", [](auto& s) -> auto& { return s.indirect.mirror_roughness; }, {0, 1}, "",
+          "Gloss of surfaces at most this rough follows one ray and is lit where that arrives; 0 = none"),
+      flag(
+          "indirect.compensate", [](auto& s) -> auto& { return s.indirect.compensate; },
+          "Light lost to the clamp is found by one short ray"),
+      flag(
+          "indirect.show", [](auto& s) -> auto& { return s.indirect.show; },
+          "More layers: steps of the walks, sizes of the substitutes, what was clamped"),
+  };
+}
+
 const std::vector<Setting>& settings() {
   static const std::vector<Setting> rows = [] {
     std::vector<Setting> all{preset_row()};
-    for (const auto& group : {image_rows(), scene_rows(), direct_rows(), indirect_rows()})
+    for (const auto& group : {image_rows(), scene_rows(), direct_rows(), indirect_rows(), vpl_rows()})
       all.insert(all.end(), group.begin(), group.end());
     for (Setting& row : all) row.info.default_value = row.get(Settings{});
     return all;
@@ -310,6 +392,15 @@ void check_view(const ViewSettings& view) {
   if (!(sine > kLeastSine)) throw Error("view.up is parallel to the viewing direction");
 }
 
+void check_vpls(const IndirectSettings& s) {
+  if (s.transport != Transport::kVpl) return;
+  if (s.selection == Selection::kRoot && s.hierarchy == IndirectHierarchy::kNone)
+    throw Error("indirect.selection 'root' walks a hierarchy, but indirect.hierarchy is 'none'; use 'substitute'");
+  if (s.correction > 0 && (s.selection != Selection::kRoot || s.stop != Stop::kSubstitute))
+    throw Error("indirect.correction corrects substitutes, but none are used; set indirect.selection 'root' and "
+                "indirect.stop 'substitute', or indirect.correction 0");
+}
+
 }  // namespace
 
 const std::vector<PresetInfo>& presets() {
@@ -349,6 +440,29 @@ const std::vector<PresetInfo>& presets() {
         {"direct.mis", "true"},
         {"indirect.transport", "path"},
         {"indirect.max_bounces", "8"}}},
+      {"sst",
+       "Stochastic substitute trees: VPLs traced for every sample, walks that stop at Gaussians standing for many VPLs; "
+       "direct light by the light tree",
+       "W. Tatzgern, B. Mayr, B. Kerbl, M. Steinberger: Stochastic Substitute Trees for Real-Time Global Illumination. "
+       "I3D 2020",
+       {{"direct.selection", "root"},
+        {"direct.hierarchy", "perfect"},
+        {"indirect.transport", "vpl"},
+        {"indirect.selection", "root"},
+        {"indirect.hierarchy", "substitute"},
+        {"indirect.weights", "distance-bounded"},
+        {"indirect.stop", "substitute"}}},
+      {"slc",
+       "Stochastic lightcuts: the same VPLs and the same tree, walked to its leaves with Yuksel's weights; direct light "
+       "by the light tree",
+       "C. Yuksel: Stochastic Lightcuts. HPG 2019",
+       {{"direct.selection", "root"},
+        {"direct.hierarchy", "perfect"},
+        {"indirect.transport", "vpl"},
+        {"indirect.selection", "root"},
+        {"indirect.hierarchy", "substitute"},
+        {"indirect.weights", "yuksel"},
+        {"indirect.stop", "leaf"}}},
   };
   return table;
 }
@@ -390,6 +504,7 @@ void check(const Settings& s) {
   if (s.view) check_view(*s.view);
   if (s.direct.selection == Selection::kRoot && s.direct.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'root' walks a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
+  check_vpls(s.indirect);
 }
 
 }  // namespace lumigrove

@@ -57,18 +57,30 @@ LUMI_HD inline bool above_surface(const Surface& s, vec3 wi) {
   return glm::dot(s.normal, wi) > 0 && glm::dot(s.geometric_normal, wi) > 0;
 }
 
-// f(wi, wo), 1/sr; without the cosine. Zero below either normal.
-LUMI_HD inline vec3 bsdf_eval(const Surface& s, vec3 wi) {
-  if (!above_surface(s, wi)) return vec3(0);
-  vec3 f = s.diffuse * kInvPi;
-  if (!has_gloss(s)) return f;
+// The gloss lobe's part of f(wi, wo) for wi above the surface, 1/sr.
+LUMI_HD inline vec3 gloss_above_surface(const Surface& s, vec3 wi) {
   const float alpha = s.roughness * s.roughness, a2 = alpha * alpha, k = 0.5f * a2;
   const vec3 h = wi + s.wo;
   const float d = ggx_normal_density(s.normal, h, a2);
   const float g = schlick_shadowing_over_cosine(glm::dot(s.normal, wi), k) *
                   schlick_shadowing_over_cosine(glm::dot(s.normal, s.wo), k);
   const float v_dot_h = glm::min(0.5f * glm::length(h), 1.0f);  // wi, wo unit: |wi + wo| = 2 VdotH
-  return f + fresnel_schlick(s.specular, v_dot_h) * (0.25f * d * g);
+  return fresnel_schlick(s.specular, v_dot_h) * (0.25f * d * g);
+}
+
+// f(wi, wo), 1/sr; without the cosine. Zero below either normal.
+LUMI_HD inline vec3 bsdf_eval(const Surface& s, vec3 wi) {
+  if (!above_surface(s, wi)) return vec3(0);
+  const vec3 f = s.diffuse * kInvPi;
+  return has_gloss(s) ? f + gloss_above_surface(s, wi) : f;
+}
+
+// Its two parts.
+LUMI_HD inline vec3 bsdf_eval_diffuse(const Surface& s, vec3 wi) {
+  return above_surface(s, wi) ? s.diffuse * kInvPi : vec3(0);
+}
+LUMI_HD inline vec3 bsdf_eval_gloss(const Surface& s, vec3 wi) {
+  return above_surface(s, wi) && has_gloss(s) ? gloss_above_surface(s, wi) : vec3(0);
 }
 
 // Probability that bsdf_sample takes the diffuse lobe: by luminance, gloss with the Fresnel factor of the

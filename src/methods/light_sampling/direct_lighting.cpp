@@ -2,6 +2,7 @@
 
 #include "base/stopwatch.h"
 #include "device/device.h"
+#include "lights/unoccluded_kernel.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 
 namespace lumigrove {

@@ -1,5 +1,5 @@
-// Kernels of direct light: one light sample for each surface, and its addition once the shadow rays are
-// answered. The estimator and its header block are in light_sampler_kernel.h.
+// Kernels of direct light: one light sample for each surface. Its addition once the shadow rays are answered is
+// AddUnoccludedKernel. The estimator and its header block are in light_sampler_kernel.h.
 #pragma once
 
 #include <span>
@@ -98,16 +98,5 @@ struct DirectLightKernel {
 
 // Calls of a DirectLightKernel for so many surfaces.
 LUMI_HD inline int walk_batches(int surfaces) { return (surfaces + kWalkBatch - 1) / kWalkBatch; }
-
-struct AddUnoccludedKernel {
-  std::span<const vec3> contribution;
-  std::span<const std::uint8_t> occluded;
-  std::span<vec3> sum;
-
-  LUMI_HD void operator()(int i) const {
-    const std::size_t k = static_cast<std::size_t>(i);
-    if (!occluded[k]) sum[k] += contribution[k];
-  }
-};
 
 }  // namespace lumigrove

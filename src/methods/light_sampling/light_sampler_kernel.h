@@ -19,7 +19,7 @@
 #include "base/rng.h"
 #include "lights/emitter.h"
 #include "lights/environment.h"
-#include "methods/light_sampling/alias_table.h"
+#include "lights/alias_table.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "scene/surface.h"
 #include "trace/ray.h"

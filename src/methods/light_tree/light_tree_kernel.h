@@ -28,7 +28,7 @@
 
 #include "base/lanes.h"
 #include "base/vec.h"
-#include "lights/packed_cone.h"
+#include "lights/cone_lanes.h"
 
 namespace lumigrove {
 
@@ -81,12 +81,6 @@ struct BoxLanes {
 };
 
 template <int W>
-struct ConeLanes {
-  LaneVec3<W> axis;  // times kConeAxis
-  Lanes<W> radius;   // times kConeRadius / 2
-};
-
-template <int W>
 LUMI_HD LUMI_ALWAYS_INLINE BoxLanes<W> load_boxes(const LightNode<W>& node) {
   return {{load_lanes<W>(node.centre_x), load_lanes<W>(node.centre_y), load_lanes<W>(node.centre_z)},
           {load_lanes<W>(node.half_x), load_lanes<W>(node.half_y), load_lanes<W>(node.half_z)},
@@ -109,17 +103,6 @@ template <int P, int W>
 LUMI_HD LUMI_ALWAYS_INLINE ConeLanes<P> broadcast_cone(const LightNode<W>& node, int c) {
   return {broadcast<P>(vec3(node.axis_x[c], node.axis_y[c], node.axis_z[c])),
           broadcast<P>(static_cast<float>(node.radius[c]))};
-}
-
-// Upper bound of cos at the emitters of every child, times `near`: n' (x - y) over all y in the box and n' in the
-// cone is at most axis (x - c) + |axis| h + radius (|x - c| + |h|), and the last sum at most sqrt(2) |far|.
-// `to_centre` is c - x, `half` is h.
-template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE Lanes<W> bound_facing(const ConeLanes<W>& cone, const LaneVec3<W>& to_centre,
-                                                 const LaneVec3<W>& half, const Lanes<W>& far) {
-  const Lanes<W> scaled = dot<W>(abs_lanes<W>(cone.axis), half) - dot<W>(cone.axis, to_centre);
-  const Lanes<W> slack = cone.radius * (far * (1.41422f * 2 / kConeRadius));
-  return multiply_add<W>(scaled, broadcast<W>(1 / kConeAxis), slack);
 }
 
 // Equation 1: w^max and w^min. `inside` is w^max without the distance where x is inside the box, elsewhere 0.

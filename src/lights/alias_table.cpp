@@ -1,4 +1,4 @@
-#include "methods/light_sampling/alias_table.h"
+#include "lights/alias_table.h"
 
 namespace lumigrove {
 
