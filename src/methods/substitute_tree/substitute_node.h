@@ -27,7 +27,62 @@ struct ChildRecord {
 
   static constexpr std::uint32_t kLeaf = 1u << 30;    // the child is a leaf
   static constexpr std::uint32_t kUsable = 1u << 31;  // its distribution may stand for its lights
+  static constexpr std::uint32_t kMeanBits = 10, kMeanSteps = (1u << kMeanBits) - 1;
 };
+
+// bfloat16 in the low half: the least one not below x >= 0.
+LUMI_HD inline std::uint32_t bfloat16_up(float x) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return (bits + 0xffffu) >> 16;
+}
+LUMI_HD inline float bfloat16_value(std::uint32_t low_half) {
+  const std::uint32_t bits = low_half << 16;
+  float x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+// Least packed extent with lo + extent >= hi, also when that is rounded to a float.
+LUMI_HD inline std::uint32_t pack_extent(float lo, float hi) {
+  const std::uint32_t up = bfloat16_up(hi - lo);
+  return lo + bfloat16_value(up) < hi ? up + 1 : up;
+}
+
+// In steps of the extent; 0 where the box is flat.
+LUMI_HD inline std::uint32_t pack_mean(float lo, float inverse_extent, float mean) {
+  constexpr float kTop = ChildRecord::kMeanSteps;
+  const float steps = (mean - lo) * inverse_extent * kTop + 0.5f;
+  return steps > 0 ? (steps < kTop ? static_cast<std::uint32_t>(steps) : ChildRecord::kMeanSteps) : 0u;
+}
+
+// `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child.
+LUMI_HD inline ChildRecord pack_child(const Box3& box, vec3 mean, PackedCone cone, float intensity,
+                                      std::uint32_t flags, std::uint32_t split_half) {
+  const std::uint32_t x = pack_extent(box.lo.x, box.hi.x), y = pack_extent(box.lo.y, box.hi.y),
+                      z = pack_extent(box.lo.z, box.hi.z);
+  const vec3 inverse = 1.0f / vec3(bfloat16_value(x), bfloat16_value(y), bfloat16_value(z));
+  const std::uint32_t packed = pack_mean(box.lo.x, inverse.x, mean.x) |
+                               pack_mean(box.lo.y, inverse.y, mean.y) << ChildRecord::kMeanBits |
+                               pack_mean(box.lo.z, inverse.z, mean.z) << (2 * ChildRecord::kMeanBits);
+  return {box.lo, x | (y << 16), split_half | (z << 16), packed | flags, cone, intensity};
+}
+
+LUMI_HD inline vec3 unpack_extent(const ChildRecord& child) {
+  return vec3(bfloat16_value(child.extent_xy & 0xffffu), bfloat16_value(child.extent_xy >> 16),
+              bfloat16_value(child.extent_z >> 16));
+}
+
+// Holds all lights below.
+LUMI_HD inline Box3 unpack_box(const ChildRecord& child) { return {child.lo, child.lo + unpack_extent(child)}; }
+
+// Within half a step of the mean, an axis.
+LUMI_HD inline vec3 unpack_mean(const ChildRecord& child) {
+  const auto steps = [&](std::uint32_t axis) {
+    return static_cast<float>((child.mean >> (axis * ChildRecord::kMeanBits)) & ChildRecord::kMeanSteps);
+  };
+  return child.lo + unpack_extent(child) * (vec3(steps(0), steps(1), steps(2)) * (1.0f / ChildRecord::kMeanSteps));
+}
 
 // One cache line.
 struct alignas(64) SubstituteNode {
@@ -55,6 +110,13 @@ struct alignas(64) Distribution {
   LUMI_HD float variance_along(vec3 direction) const { return glm::dot(direction, times_covariance(direction)); }
 };
 static_assert(sizeof(Distribution) == 64);
+
+// During the build only: what the parent of an inner node needs and does not find in the Distribution.
+struct alignas(32) NodeExtent {
+  Box3 box;  // exact
+  PackedCone cone;
+  std::uint32_t flags;  // of ChildRecord
+};
 
 struct SubstituteTreeView {
   const SubstituteNode* nodes = nullptr;         // N - 1
