@@ -410,17 +410,6 @@ LUMI_HD LUMI_ALWAYS_INLINE bool step_substitute_walks(const SubstituteWalk& walk
   return greater_bits<L>(goes_on, zero) != 0;
 }
 
-// Box of a child as stored: it holds the child's lights.
-LUMI_HD inline Box3 box_of(const ChildRecord& child) {
-  const auto extent = [](std::uint32_t bits) {
-    float f;
-    std::memcpy(&f, &bits, sizeof f);
-    return f;
-  };
-  return {child.lo, child.lo + vec3(extent(child.extent_xy << 16), extent(child.extent_xy & 0xffff0000u),
-                                    extent(child.extent_z & 0xffff0000u))};
-}
-
 LUMI_HD inline WalkResult walk_result(const SubstituteWalk& walk, const SubstituteWalkState& state, int i) {
   WalkResult result;
   result.steps = static_cast<int>(state.steps[i]);
@@ -429,7 +418,7 @@ LUMI_HD inline WalkResult walk_result(const SubstituteWalk& walk, const Substitu
   const SubstituteNode& parent = walk.tree.nodes[state.parent[i]];
   result.end = (state.flags[i] & ChildRecord::kLeaf) != 0 ? WalkEnd::kLeaf : WalkEnd::kSubstitute;
   result.node = state.child[i];
-  if (result.end == WalkEnd::kSubstitute) result.box = box_of(parent.child[result.node - parent.split()]);
+  if (result.end == WalkEnd::kSubstitute) result.box = unpack_box(parent.child[result.node - parent.split()]);
   return result;
 }
 
