@@ -20,6 +20,10 @@ const std::vector<Benchmark>& benchmarks() {
        error_tree_power},
       {"sort.radix.1m", "ratio", "radix sort / tbb::parallel_sort of 1,000,000 (30-bit key, index) pairs",
        0.5, sort_radix_1m},
+      {"vpl.trace.night-city", "ratio",
+       "tracing of 100 k virtual point lights, 3 a path / the same rays through bare Embree", 2.0,
+       vpl_trace_night_city},
+      {"vpl.trace.colonnade", "ratio", "the same in colonnade", 2.0, vpl_trace_colonnade},
   };
   return table;
 }
