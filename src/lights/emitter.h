@@ -37,9 +37,15 @@ LUMI_HD inline float emitter_flux(const LightView& lights, std::uint32_t index) 
   const float intensity = emitter_intensity(lights, index);
   if (!e.punctual()) return intensity * kPi * (lights.instances[e.source].double_sided ? 2.0f : 1.0f);
   if (!lights.punctual[e.source & ~Emitter::kPunctual].spot) return intensity * 4 * kPi;
-  // Integral of the squared linear ramp in cos over the cone.
-  const float cos_outer = e.e2.x, cos_inner = cos_outer + 1 / e.e2.y;
-  return intensity * 2 * kPi * glm::max(0.0f, (1 - cos_inner) + (cos_inner - cos_outer) / 3);
+  // Integral of the squared linear ramp in cos over the cone; in the thinnest cones it does not rise to 1.
+  const float cone = glm::max(0.0f, 1 - e.e2.x), ramp = glm::min(1 / e.e2.y, cone), top = ramp * e.e2.y;
+  return intensity * 2 * kPi * (cone - ramp + ramp * top * top / 3);
+}
+
+// Lights that shine: emitters, then directional lights, then the environment, numbered in this order.
+LUMI_HD inline std::uint32_t light_count(const LightView& lights) {
+  return static_cast<std::uint32_t>(lights.emitters.size() + lights.directional.size()) +
+         (lights.environment.present() ? 1u : 0u);
 }
 
 LUMI_HD inline Box3 emitter_bounds(const Emitter& e) {
@@ -96,6 +102,19 @@ struct EmitterPoint {
       0;  // d^2 / cos at the light: converts a pdf per area to one per solid angle; 0 for a delta
 };
 
+// KHR_lights_punctual: what is left of a light at squared distance d2. Range 0 is unlimited.
+LUMI_HD inline float range_window(float d2, float range) {
+  if (!(range > 0)) return 1;
+  const float ratio2 = d2 / (range * range);
+  return glm::clamp(1 - ratio2 * ratio2, 0.0f, 1.0f);
+}
+
+// Likewise, of a spot light in a direction at this cosine to its axis.
+LUMI_HD inline float spot_profile(const Emitter& e, float cos_axis) {
+  const float ramp = glm::clamp((cos_axis - e.e2.x) * e.e2.y, 0.0f, 1.0f);
+  return ramp * ramp;
+}
+
 LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitter& e, vec3 x) {
   EmitterPoint p;
   const PunctualView& light = lights.punctual[e.source & ~Emitter::kPunctual];
@@ -105,15 +124,8 @@ LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitte
   p.position = e.p0;
   p.distance = glm::sqrt(d2);
   p.wi = to_light / p.distance;
-  float attenuation = 1 / d2;
-  if (light.range > 0) {
-    const float ratio2 = d2 / (light.range * light.range);
-    attenuation *= glm::clamp(1 - ratio2 * ratio2, 0.0f, 1.0f);
-  }
-  if (light.spot) {
-    const float ramp = glm::clamp((-glm::dot(p.wi, e.e1) - e.e2.x) * e.e2.y, 0.0f, 1.0f);
-    attenuation *= ramp * ramp;
-  }
+  float attenuation = range_window(d2, light.range) / d2;
+  if (light.spot) attenuation *= spot_profile(e, -glm::dot(p.wi, e.e1));
   p.incident = light.intensity * attenuation;
   return p;
 }

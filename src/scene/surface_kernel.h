@@ -15,6 +15,7 @@
 //                pixel
 #pragma once
 
+#include "base/lanes.h"
 #include "scene/interpolate.h"
 #include "scene/scene_view.h"
 #include "scene/surface.h"
@@ -164,6 +165,26 @@ LUMI_HD inline Surface make_surface(const SceneView& scene, const Ray& ray, cons
   Surface s;
   write_surface(scene, ray, hit, force_diffuse, s);
   return s;
+}
+
+// Hits of incoherent rays lie anywhere in memory: fetches early what make_surface will read of those that follow. The
+// vertices are known only from the triangle, so they follow half as far ahead.
+LUMI_HD LUMI_ALWAYS_INLINE void prefetch_surfaces(const SceneView& scene, std::span<const Hit> hits, std::size_t i) {
+  constexpr std::size_t kAhead = 4;
+  if (i + 2 * kAhead >= hits.size()) return;
+  const auto mesh_of = [&](const Hit& hit) -> const MeshView& {
+    return scene.meshes[static_cast<std::size_t>(scene.instances[hit.instance].mesh)];
+  };
+  if (const Hit& far = hits[i + 2 * kAhead]; far.instance != kNone) prefetch(&mesh_of(far).triangles[far.triangle]);
+  const Hit& near = hits[i + kAhead];
+  if (near.instance == kNone) return;
+  const MeshView& mesh = mesh_of(near);
+  const uvec3 triangle = mesh.triangles[near.triangle];
+  for (int k = 0; k < 3; ++k) {
+    prefetch(&mesh.positions[triangle[k]]);
+    if (mesh.normals) prefetch(&mesh.normals[triangle[k]]);
+    if (mesh.uv0) prefetch(&mesh.uv0[triangle[k]]);
+  }
 }
 
 // One surface a hit. `Surface::emitter` is left for whoever knows the light set.

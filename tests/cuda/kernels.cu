@@ -13,11 +13,13 @@
 #include "device/cuda/launch.h"
 #include "frame/emission_kernel.h"
 #include "lights/light_set.h"
+#include "lights/vpl.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/light_tree/light_tree_build_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
+#include "methods/vpl/vpl_kernel.h"
 #include "scene/bsdf.h"
 #include "scene/camera_kernel.h"
 #include "scene/scene_view.h"
@@ -99,5 +101,7 @@ template void cuda::launch<PathArriveKernel>(int, const PathArriveKernel&, cudaS
 template void cuda::launch<PathEmissionKernel>(int, const PathEmissionKernel&, cudaStream_t);
 template void cuda::launch<PathPixelsKernel>(int, const PathPixelsKernel&, cudaStream_t);
 template void cuda::launch<PathLightKernel>(int, const PathLightKernel&, cudaStream_t);
+template void cuda::launch<VplEmitKernel>(int, const VplEmitKernel&, cudaStream_t);
+template void cuda::launch<VplBounceKernel>(int, const VplBounceKernel&, cudaStream_t);
 
 }  // namespace lumigrove

@@ -197,12 +197,6 @@ LUMI_HD inline LightSample one_sample(const LightSampler& sampler, const Surface
   return environment_sample(sampler, surface, 1, u);
 }
 
-// Number of lights that kOne counts through.
-LUMI_HD inline std::uint32_t light_count(const LightView& lights) {
-  return static_cast<std::uint32_t>(lights.emitters.size() + lights.directional.size()) +
-         (lights.environment.present() ? 1u : 0u);
-}
-
 enum class LightGroup : std::uint8_t { kDark, kLocal, kDirectional, kEnvironment };
 
 struct ChosenGroup {

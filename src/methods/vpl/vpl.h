@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/large_array.h"
@@ -41,6 +42,24 @@ class VplSet {
   const std::vector<double>& bounce_flux() const { return bounce_flux_; }
 
  private:
+  // What the paths of one task leave. Tasks are put together in their order, whoever did them.
+  struct Chunk {
+    std::vector<Vpl> vpls;
+    Box3 bounds;  // of their positions
+    double emitted_flux = 0;
+    std::vector<double> bounce_flux;
+    std::uint64_t rays = 0;
+
+    void start(int bounces);
+    void keep(std::span<const Vpl> left, int bounce);
+  };
+  struct Launch;
+  struct Buffers;
+  static void trace_chunk(const Launch& job, int first, Buffers& buffers, Chunk& chunk);
+  void concatenate(int chunks, int bounces);
+
+  std::vector<double> cumulative_;  // flux of the lights
+  std::vector<Chunk> chunks_;
   LargeArray<Vpl> vpls_;
   Box3 bounds_;
   float diagonal_ = 1;
