@@ -103,17 +103,12 @@ struct SubstitutePrefixKernel {
   }
 };
 
-LUMI_HD LUMI_ALWAYS_INLINE Distribution leaf_distribution(const Vpl& vpl) {
-  return {vpl.position, 1, vpl.intensity, vpl.normal, {}};
-}
-
 // Weighted by the children's intensities; of which neither is zero unless both are too small for a sum.
-LUMI_HD LUMI_ALWAYS_INLINE Distribution merge_distributions(const Distribution& a, const Distribution& b, float weight_a,
-                                                            float weight_b) {
+LUMI_HD LUMI_ALWAYS_INLINE void merge_distributions(const Distribution& a, const Distribution& b, float weight_a,
+                                                    float weight_b, Distribution& sum) {
   const float total = weight_a + weight_b;
   const float share_b = total > 0 ? weight_b / total : 0.5f, share_a = 1 - share_b;
   const vec3 apart = b.mean - a.mean;
-  Distribution sum;
   sum.intensity = a.intensity + b.intensity;
   sum.mean = a.mean + apart * share_b;  // (1)
   sum.nu = a.nu * b.nu * glm::clamp(glm::dot(a.normal, b.normal), 0.0f, 1.0f);
@@ -128,7 +123,6 @@ LUMI_HD LUMI_ALWAYS_INLINE Distribution merge_distributions(const Distribution& 
                           apart.x * spread.y, apart.x * spread.z, apart.y * spread.z};
   for (int k = 0; k < 6; ++k)
     sum.covariance[k] = a.covariance[k] * share_a + b.covariance[k] * share_b + outer[k];
-  return sum;
 }
 
 // From leaf i upwards, as far as the other child of each parent has come already.
@@ -145,6 +139,7 @@ struct SubstituteMergeKernel {
 
   LUMI_HD void operator()(int i) const {
     prefetch_leaf(static_cast<std::uint32_t>(i) + kAhead);
+    prefetch_node(static_cast<std::uint32_t>(i) + kAhead);
     std::uint32_t first = static_cast<std::uint32_t>(i), last = first;
     bool left = is_left_child(first, last);
     do {
@@ -166,6 +161,13 @@ struct SubstituteMergeKernel {
     prefetch(&vpl.intensity.z);
   }
 
+  LUMI_HD LUMI_ALWAYS_INLINE void prefetch_node(std::uint32_t number) const {
+    if (number + 1 >= count) return;
+    __builtin_prefetch(&nodes[number], 1);
+    __builtin_prefetch(&distributions[number], 1);
+    __builtin_prefetch(&extents[number], 1);
+  }
+
   // Whether the parent of the node over leaves first..last splits its own leaves after `last`: it is the ancestor whose
   // leaves have more bits in common. Not for the root.
   LUMI_HD bool is_left_child(std::uint32_t first, std::uint32_t last) const {
@@ -177,39 +179,41 @@ struct SubstituteMergeKernel {
     NodeExtent extent;
     float weight;
   };
-  LUMI_HD LUMI_ALWAYS_INLINE Child load_child(std::uint32_t number, bool leaf) const {
-    Child child;
+  LUMI_HD LUMI_ALWAYS_INLINE void load_child(std::uint32_t number, bool leaf, Child& child) const {
     if (leaf) {
-      child.distribution = leaf_distribution(vpls[leaves[number]]);
-      const vec3 p = child.distribution.mean;
-      child.extent = {{p, p}, pack_normal(child.distribution.normal), ChildRecord::kLeaf};
+      const Vpl& vpl = vpls[leaves[number]];
+      child.distribution = {vpl.position, 1, vpl.intensity, vpl.normal, {}};
+      child.extent = {{vpl.position, vpl.position}, pack_normal(vpl.normal), ChildRecord::kLeaf};
     } else {
       child.distribution = distributions[number];
       child.extent = extents[number];
     }
     child.weight = luminance(child.distribution.intensity);
-    return child;
   }
 
   LUMI_HD void make_node(std::uint32_t number, std::uint32_t split, bool left_leaf, bool right_leaf) const {
-    const Child a = load_child(split, left_leaf), b = load_child(split + 1, right_leaf);
-    nodes[number].child[0] = pack(a, split & 0xffffu);
-    nodes[number].child[1] = pack(b, split >> 16);
-    Distribution sum = merge_distributions(a.distribution, b.distribution, a.weight, b.weight);
+    Child a, b;
+    load_child(split, left_leaf, a);
+    load_child(split + 1, right_leaf, b);
+    pack(a, split & 0xffffu, nodes[number].child[0]);
+    pack(b, split >> 16, nodes[number].child[1]);
+    Distribution& sum = distributions[number];
+    merge_distributions(a.distribution, b.distribution, a.weight, b.weight, sum);
     const Box3 box = unite(a.extent.box, b.extent.box);
     sum.mean = glm::clamp(sum.mean, box.lo, box.hi);
-    distributions[number] = sum;
-    extents[number] = {box, unite(a.extent.cone, b.extent.cone), usable(sum, box) ? ChildRecord::kUsable : 0u};
+    extents[number].box = box;
+    extents[number].cone = unite(a.extent.cone, b.extent.cone);
+    extents[number].flags = usable(sum, box) ? ChildRecord::kUsable : 0u;
   }
 
-  LUMI_HD static ChildRecord pack(const Child& child, std::uint32_t split_half) {
-    return pack_child(child.extent.box, child.distribution.mean, child.extent.cone, child.weight, child.extent.flags,
-                      split_half);
+  LUMI_HD LUMI_ALWAYS_INLINE static void pack(const Child& child, std::uint32_t split_half, ChildRecord& record) {
+    pack_child(child.extent.box, child.distribution.mean, child.extent.cone, child.weight, child.extent.flags,
+               split_half, record);
   }
 
   LUMI_HD bool usable(const Distribution& d, const Box3& box) const {  // (3)
-    return d.nu >= min_nu && glm::sqrt(glm::max(d.variance_along(d.normal), 0.0f)) <= max_sigma &&
-           box.diagonal() <= max_diagonal;
+    return d.nu >= min_nu && d.variance_along(d.normal) <= max_sigma * max_sigma &&
+           length_squared(box.extent()) <= max_diagonal * max_diagonal;
   }
 };
 
