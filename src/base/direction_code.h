@@ -1,5 +1,5 @@
 // 9-bit codes of directions: the octant, then three subdivisions of its triangle into four. Directions of equal codes
-// lie within 10.3 degrees of direction_of_code().
+// lie within kDirectionCodeDegrees of direction_of_code().
 // Taubin and Rossignac 1998, "Geometric Compression through Topological Surgery", ACM TOG 17(2), subdivides alike.
 #pragma once
 
@@ -11,6 +11,7 @@
 namespace lumigrove {
 
 inline constexpr int kDirectionBits = 9, kDirectionLevels = 3;
+inline constexpr float kDirectionCodeDegrees = 10.3f;
 
 // Octant: x, y, z from the highest bit, 1 if not negative. Each level, coarsest first: 0, 1, 2 = the corner at y, z, x;
 // 3 = the middle. `n` need not be unit; 0 for zero and NaN.

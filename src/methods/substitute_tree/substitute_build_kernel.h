@@ -163,9 +163,9 @@ struct SubstituteMergeKernel {
 
   LUMI_HD LUMI_ALWAYS_INLINE void prefetch_node(std::uint32_t number) const {
     if (number + 1 >= count) return;
-    __builtin_prefetch(&nodes[number], 1);
-    __builtin_prefetch(&distributions[number], 1);
-    __builtin_prefetch(&extents[number], 1);
+    prefetch_to_write(&nodes[number]);
+    prefetch_to_write(&distributions[number]);
+    prefetch_to_write(&extents[number]);
   }
 
   // Whether the parent of the node over leaves first..last splits its own leaves after `last`: it is the ancestor whose
