@@ -31,4 +31,29 @@ LUMI_HD inline std::uint8_t pack_radius(float radius) {
   return static_cast<std::uint8_t>(glm::clamp(glm::ceil((radius + 1e-4f) * (0.5f * kConeRadius)), 0.0f, kConeRadius));
 }
 
+// Holds one normal.
+LUMI_HD inline PackedCone pack_normal(vec3 normal) {
+  PackedCone cone = pack_axis(normal);
+  cone.radius = pack_radius(glm::length(normal - cone.axis()));
+  return cone;
+}
+
+// Holds both. Never larger than the larger one when that holds the other, so that many cones of nearly flat surfaces
+// unite without growing by roundings.
+LUMI_HD inline PackedCone unite(PackedCone a, PackedCone b) {
+  constexpr float kUnit = 0.5f * kConeRadius / kConeAxis;  // a step of an axis in steps of the radius
+  const vec3 p(a.x, a.y, a.z), q(b.x, b.y, b.z);
+  const float apart = glm::length(p - q) * (kUnit * (1 + 1e-6f)), ra = a.radius, rb = b.radius;
+  if (ra >= rb + apart) return a;
+  if (rb >= ra + apart) return b;
+  const vec3 sum = p + q;
+  const float length = glm::length(sum);
+  PackedCone both = pack_axis(length > 0.5f ? sum / length : vec3(0));
+  const vec3 c(both.x, both.y, both.z);
+  const float radius = glm::max(ra + glm::length(p - c) * kUnit, rb + glm::length(q - c) * kUnit);
+  if (!(radius + 1e-3f < kConeRadius)) return {};
+  both.radius = static_cast<std::uint8_t>(glm::ceil(radius + 1e-3f));
+  return both;
+}
+
 }  // namespace lumigrove

@@ -21,13 +21,75 @@ struct ChildRecord {
   vec3 lo;                     // of the box
   std::uint32_t extent_xy;     // of the box, bfloat16 rounded up: x in the low half, y in the high half
   std::uint32_t extent_z;      // z in the high half; in the low half 16 bits of the split (SubstituteNode::split)
-  std::uint32_t mean;          // 10 bits an axis (x lowest) of (mean - lo) / extent, and flags
+  std::uint32_t mean;          // 10 bits an axis (x lowest) of (mean - lo) / extent, 1 = kMeanSteps; and flags
   PackedCone cone;             // holds the normals of all lights below
   float intensity;             // Y of the lights' summed intensity, W/sr
 
   static constexpr std::uint32_t kLeaf = 1u << 30;    // the child is a leaf
   static constexpr std::uint32_t kUsable = 1u << 31;  // its distribution may stand for its lights
+  static constexpr std::uint32_t kMeanBits = 10, kMeanSteps = (1u << kMeanBits) - 1;
 };
+
+// bfloat16 in the low half: the least one not below x >= 0.
+LUMI_HD inline std::uint32_t bfloat16_up(float x) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return (bits + 0xffffu) >> 16;
+}
+LUMI_HD inline float bfloat16_value(std::uint32_t low_half) {
+  const std::uint32_t bits = low_half << 16;
+  float x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+// Least packed extent with lo + extent >= hi, also when that is rounded to a float.
+LUMI_HD inline std::uint32_t pack_extent(float lo, float hi) {
+  const std::uint32_t up = bfloat16_up(hi - lo);
+  return lo + bfloat16_value(up) < hi ? up + 1 : up;
+}
+
+// In steps of the extent; 0 where the box is flat.
+LUMI_HD inline std::uint32_t pack_mean(float lo, float inverse_extent, float mean) {
+  constexpr float kTop = ChildRecord::kMeanSteps;
+  const float steps = (mean - lo) * inverse_extent * kTop + 0.5f;
+  const float positive = steps > 0 ? steps : 0;  // also where NaN
+  return static_cast<std::uint32_t>(static_cast<int>(positive < kTop ? positive : kTop));
+}
+
+// `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child. Writes in place,
+// because a record copied right after it was made waits for its parts.
+LUMI_HD inline void pack_child(const Box3& box, vec3 mean, PackedCone cone, float intensity, std::uint32_t flags,
+                               std::uint32_t split_half, ChildRecord& child) {
+  const std::uint32_t x = pack_extent(box.lo.x, box.hi.x), y = pack_extent(box.lo.y, box.hi.y),
+                      z = pack_extent(box.lo.z, box.hi.z);
+  const vec3 inverse = 1.0f / vec3(bfloat16_value(x), bfloat16_value(y), bfloat16_value(z));
+  const std::uint32_t packed = pack_mean(box.lo.x, inverse.x, mean.x) |
+                               pack_mean(box.lo.y, inverse.y, mean.y) << ChildRecord::kMeanBits |
+                               pack_mean(box.lo.z, inverse.z, mean.z) << (2 * ChildRecord::kMeanBits);
+  child.lo = box.lo;
+  child.extent_xy = x | (y << 16);
+  child.extent_z = split_half | (z << 16);
+  child.mean = packed | flags;
+  child.cone = cone;
+  child.intensity = intensity;
+}
+
+LUMI_HD inline vec3 unpack_extent(const ChildRecord& child) {
+  return vec3(bfloat16_value(child.extent_xy & 0xffffu), bfloat16_value(child.extent_xy >> 16),
+              bfloat16_value(child.extent_z >> 16));
+}
+
+// Holds all lights below.
+LUMI_HD inline Box3 unpack_box(const ChildRecord& child) { return {child.lo, child.lo + unpack_extent(child)}; }
+
+// Within half a step of the mean, an axis.
+LUMI_HD inline vec3 unpack_mean(const ChildRecord& child) {
+  const auto steps = [&](std::uint32_t axis) {
+    return static_cast<float>((child.mean >> (axis * ChildRecord::kMeanBits)) & ChildRecord::kMeanSteps);
+  };
+  return child.lo + unpack_extent(child) * (vec3(steps(0), steps(1), steps(2)) * (1.0f / ChildRecord::kMeanSteps));
+}
 
 // One cache line.
 struct alignas(64) SubstituteNode {
@@ -55,6 +117,13 @@ struct alignas(64) Distribution {
   LUMI_HD float variance_along(vec3 direction) const { return glm::dot(direction, times_covariance(direction)); }
 };
 static_assert(sizeof(Distribution) == 64);
+
+// During the build only: what the parent of an inner node needs and does not find in the Distribution.
+struct alignas(32) NodeExtent {
+  Box3 box;  // exact
+  PackedCone cone;
+  std::uint32_t flags;  // of ChildRecord
+};
 
 struct SubstituteTreeView {
   const SubstituteNode* nodes = nullptr;         // N - 1

@@ -28,10 +28,20 @@ class SubstituteTree {
   double build_ms() const { return build_ms_; }
 
  private:
+  void sort_lights(const VplView& lights);
+  void link_leaves(Topology topology);
+  void merge(const Options& options);
+
   SubstituteTreeView view_;
   LargeArray<SubstituteNode> nodes_;
   LargeArray<Distribution> distributions_;
   LargeArray<std::uint32_t> leaves_;
+  // Of the build only.
+  LargeArray<KeyIndex> keys_, sort_scratch_;
+  LargeArray<std::uint32_t> morton_, arrivals_;
+  LargeArray<std::uint16_t> direction_;
+  LargeArray<std::uint8_t> common_;
+  LargeArray<NodeExtent> extents_;
   double build_ms_ = 0;
 };
 
