@@ -41,6 +41,8 @@ Result sample_scaling(const Options& options);
 Result memory_per_emitter(const Options& options);
 Result error_tree_power(const Options& options);
 Result sort_radix_1m(const Options& options);
+Result build_substitute_1m(const Options& options);
+Result build_substitute_growth(const Options& options);
 
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

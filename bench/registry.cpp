@@ -20,6 +20,11 @@ const std::vector<Benchmark>& benchmarks() {
        error_tree_power},
       {"sort.radix.1m", "ratio", "radix sort / tbb::parallel_sort of 1,000,000 (30-bit key, index) pairs",
        0.5, sort_radix_1m},
+      {"build.substitute.1m", "ratio",
+       "whole substitute tree of 1 M lights / tbb::parallel_sort of its (key, index) pairs", 2.0,
+       build_substitute_1m},
+      {"build.substitute.growth", "ratio", "time of a substitute tree of 1 M lights / of 100 k", std::nullopt,
+       build_substitute_growth},
   };
   return table;
 }
