@@ -21,7 +21,7 @@ struct ChildRecord {
   vec3 lo;                     // of the box
   std::uint32_t extent_xy;     // of the box, bfloat16 rounded up: x in the low half, y in the high half
   std::uint32_t extent_z;      // z in the high half; in the low half 16 bits of the split (SubstituteNode::split)
-  std::uint32_t mean;          // 10 bits an axis (x lowest) of (mean - lo) / extent, and flags
+  std::uint32_t mean;          // 10 bits an axis (x lowest) of (mean - lo) / extent, 1 = kMeanSteps; and flags
   PackedCone cone;             // holds the normals of all lights below
   float intensity;             // Y of the lights' summed intensity, W/sr
 
@@ -57,8 +57,13 @@ LUMI_HD inline std::uint32_t pack_mean(float lo, float inverse_extent, float mea
   return static_cast<std::uint32_t>(static_cast<int>(positive < kTop ? positive : kTop));
 }
 
+<<<<<<< HEAD
 // `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child. Writes in place: a
 // record copied right after it was made waits for its parts.
+=======
+// `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child. Writes in place,
+// because a record copied right after it was made waits for its parts.
+>>>>>>> sub
 LUMI_HD inline void pack_child(const Box3& box, vec3 mean, PackedCone cone, float intensity, std::uint32_t flags,
                                std::uint32_t split_half, ChildRecord& child) {
   const std::uint32_t x = pack_extent(box.lo.x, box.hi.x), y = pack_extent(box.lo.y, box.hi.y),
