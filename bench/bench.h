@@ -43,11 +43,8 @@ Result error_tree_power(const Options& options);
 Result sort_radix_1m(const Options& options);
 Result build_substitute_1m(const Options& options);
 Result build_substitute_growth(const Options& options);
-<<<<<<< HEAD
 Result vpl_trace_night_city(const Options& options);
 Result vpl_trace_colonnade(const Options& options);
-=======
->>>>>>> sub
 
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -25,13 +25,10 @@ const std::vector<Benchmark>& benchmarks() {
        build_substitute_1m},
       {"build.substitute.growth", "ratio", "time of a substitute tree of 1 M lights / of 100 k", std::nullopt,
        build_substitute_growth},
-<<<<<<< HEAD
       {"vpl.trace.night-city", "ratio",
        "tracing of 100 k virtual point lights, 3 a path / the same rays through bare Embree", 2.0,
        vpl_trace_night_city},
       {"vpl.trace.colonnade", "ratio", "the same in colonnade", 2.0, vpl_trace_colonnade},
-=======
->>>>>>> sub
   };
   return table;
 }

@@ -40,7 +40,6 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch(const void* address) {
 #endif
 }
 
-<<<<<<< HEAD
 // What was stored is loaded again: GCC would rather take lanes out of a register one by one, at two operations each.
 LUMI_HD LUMI_ALWAYS_INLINE void forget_registers() {
 #if LUMI_VECTOR_LANES
@@ -48,8 +47,6 @@ LUMI_HD LUMI_ALWAYS_INLINE void forget_registers() {
 #endif
 }
 
-=======
->>>>>>> sub
 // The same for a line that will be written soon.
 LUMI_HD LUMI_ALWAYS_INLINE void prefetch_to_write(const void* address) {
 #if LUMI_VECTOR_LANES

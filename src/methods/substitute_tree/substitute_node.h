@@ -57,13 +57,8 @@ LUMI_HD inline std::uint32_t pack_mean(float lo, float inverse_extent, float mea
   return static_cast<std::uint32_t>(static_cast<int>(positive < kTop ? positive : kTop));
 }
 
-<<<<<<< HEAD
-// `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child. Writes in place: a
-// record copied right after it was made waits for its parts.
-=======
 // `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child. Writes in place,
 // because a record copied right after it was made waits for its parts.
->>>>>>> sub
 LUMI_HD inline void pack_child(const Box3& box, vec3 mean, PackedCone cone, float intensity, std::uint32_t flags,
                                std::uint32_t split_half, ChildRecord& child) {
   const std::uint32_t x = pack_extent(box.lo.x, box.hi.x), y = pack_extent(box.lo.y, box.hi.y),
