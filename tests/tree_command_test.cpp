@@ -123,9 +123,9 @@ TEST_F(TreeCommand, StatisticsAddUp) {
   EXPECT_EQ(tree["inner_nodes"].get<int>(), report["vpls"].get<int>() - 1);
   EXPECT_GE(tree["depth_mean"].get<double>(), std::log2(report["vpls"].get<double>()) - 1e-9);
   EXPECT_GE(tree["depth_max"].get<double>(), tree["depth_mean"].get<double>());
-  EXPECT_NEAR(walks["leaf_share"].get<double>() + walks["substitute_share"].get<double>() +
-                  walks["dead_share"].get<double>(),
-              1, 1e-12);
+  EXPECT_NEAR(
+      walks["leaf_share"].get<double>() + walks["substitute_share"].get<double>() + walks["dead_share"].get<double>(),
+      1, 1e-12);
   EXPECT_GT(walks["substitute_share"].get<double>(), 0);
   EXPECT_LE(walks["inside_beyond_offset_share"].get<double>(), walks["inside_share"].get<double>());
   EXPECT_LE(walks["steps_max"].get<int>(), tree["depth_max"].get<int>());
@@ -159,6 +159,10 @@ void expect_consistent_walk(const Json& report) {
     EXPECT_TRUE(truth == 0 || std::abs(truth - 1) < 1e-9) << truth;
     const int taken = step["taken"].get<int>();
     ASSERT_GE(taken, 0);
+    const double beyond = step["random"].get<double>() - left["probability"].get<double>();
+    if (std::abs(beyond) > 1e-3) {
+      EXPECT_EQ(taken, beyond > 0 ? 1 : 0);
+    }
     product *= step["children"][static_cast<std::size_t>(taken)]["probability"].get<double>();
   }
   EXPECT_NEAR(product / report["drawn"]["probability"].get<double>(), 1, 1e-4);

@@ -78,9 +78,10 @@ std::unique_ptr<World> grow_tree(const Scene& scene, const Settings& settings) {
   // Twice: the second build has its buffers, as all but the first of a sequence.
   for (int k = 0; k < 2; ++k) trace_vpls(*world, settings, 0, stats);
   if (world->substitutes.view().count == 0)
-    throw Error(fmt::format("'{}' leaves no virtual point lights: nothing shines, or no light meets a surface that "
-                            "reflects it",
-                            scene.name));
+    throw Error(
+        fmt::format("'{}' leaves no virtual point lights: nothing shines, or no light meets a surface that "
+                    "reflects it",
+                    scene.name));
   return world;
 }
 
@@ -123,12 +124,13 @@ void print_pixel(const TreeOptions& options, const Settings& settings, const Wor
   const std::uint32_t pixel = seen.pixels.at(0);
   if (report.surface.instance == kNone)
     throw Error(fmt::format("no surface is seen at pixel {},{}", report.x, report.y));
-  if (options.gloss && !has_gloss(report.surface))
-    throw Error(fmt::format("the surface at pixel {},{} has no gloss lobe", report.x, report.y));
+  if (options.gloss && !lights_gloss(lighting.sampler, report.surface))
+    throw Error(fmt::format("the surface at pixel {},{} has no gloss lobe that walks would light", report.x, report.y));
   report.lobe = options.gloss ? Lobes::kGloss : Lobes::kDiffuse;
-  const float diffuse = settings.indirect.gloss ? diffuse_walk_probability(report.surface) : 1.0f;
+  const float diffuse = diffuse_walk_probability(lighting.sampler, report.surface);
   report.lobe_probability = options.gloss ? 1 - diffuse : diffuse;
-  report.corrects = settings.indirect.correction > 0;
+  if (settings.indirect.correction > 0) report.left_out.emplace_back("indirect.correction");
+  if (settings.indirect.compensate) report.left_out.emplace_back("indirect.compensate");
   report.truth = true_light(world, lighting, report.surface, report.lobe);
   report.walk = explain_walk(world, lighting, report.surface, pixel, 0, report.lobe, report.truth);
   if (options.samples > 0)
@@ -157,8 +159,7 @@ void export_tree(const std::string& file, const World& world, bool quiet) {
 void write_overlay(const TreeOptions& options, const Settings& settings, const Scene& scene, const World& world) {
   const ToneMap tone = options.output->tone();
   const Image rendered = render(scene, settings);
-  const OverlayPicture overlay =
-      draw_overlay(world, settings, rendered, tone, overlay_from_name(options.overlay));
+  const OverlayPicture overlay = draw_overlay(world, settings, rendered, tone, overlay_from_name(options.overlay));
   for (const std::string& file : options.output->files) {
     write_picture(overlay.picture, settings.width, settings.height, file);
     if (!options.log->quiet) fmt::print("wrote {} ({}x{})\n", file, settings.width, settings.height);
@@ -172,8 +173,10 @@ void check_options(const TreeOptions& options) {
   const std::vector<std::string>& pictures = options.output->files;
   if (!options.overlay.empty()) overlay_from_name(options.overlay);
   if (!options.overlay.empty() && pictures.empty()) throw Error("--overlay needs -o FILE to write its picture to");
-  if (options.overlay.empty() && !pictures.empty()) throw Error("-o writes the picture of --overlay, which is not given");
-  if (!options.overlay.empty() && options.explains_pixel()) throw Error("--overlay shows the whole image, not a --pixel");
+  if (options.overlay.empty() && !pictures.empty())
+    throw Error("-o writes the picture of --overlay, which is not given");
+  if (!options.overlay.empty() && options.explains_pixel())
+    throw Error("--overlay shows the whole image, not a --pixel");
   if (options.json && !options.overlay.empty()) throw Error("--json prints statistics or a --pixel, not an --overlay");
   if ((options.gloss || options.samples > 0) && !options.explains_pixel())
     throw Error(fmt::format("{} needs --pixel X Y", options.gloss ? "--gloss" : "--samples"));
@@ -210,13 +213,13 @@ void add_tree_command(CLI::App& app) {
   options->output = add_output_options(*command);
   command->get_option("--output")->description("Picture of --overlay: .png or .jpg; may be repeated");
   command->add_flag("--gloss", options->gloss, "--pixel: explain the walk for the gloss lobe, not the diffuse one");
-  command
-      ->add_option("--samples", options->samples, "--pixel: also sum up N walks and compare them with the truth")
+  command->add_option("--samples", options->samples, "--pixel: also sum up N walks and compare them with the truth")
       ->check(CLI::Range(2, 1 << 20))
       ->type_name("N");
-  command->add_option("--overlay", options->overlay,
-                      "Draw over the image: vpls, ellipses (substitutes), steps (of the walks), size (of the "
-                      "substitutes)")
+  command
+      ->add_option("--overlay", options->overlay,
+                   "Draw over the image: vpls, ellipses (substitutes), steps (of the walks), size (of the "
+                   "substitutes)")
       ->type_name("NAME");
   command
       ->add_option("--export", options->exports,

@@ -1,6 +1,7 @@
 #include "tree_text.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -34,8 +35,7 @@ std::string quantile_heading(const std::string& name) {
 
 Json quantile_json(const Quantiles& values) {
   Json json = Json::object();
-  for (std::size_t k = 0; k < values.size(); ++k)
-    json[fmt::format("{:.0f}%", 100 * kQuantileShares[k])] = values[k];
+  for (std::size_t k = 0; k < values.size(); ++k) json[fmt::format("{:.0f}%", 100 * kQuantileShares[k])] = values[k];
   return json;
 }
 
@@ -55,10 +55,12 @@ std::string child_line(const WalkStep& step, int number, int side, bool visibili
   const WeighedChild& child = step.child[side];
   const std::string start =
       side == 0 ? fmt::format("{:>4}{:>8}{:>8.4f}", number, step.node, step.random) : fmt::format("{:>20}", "");
-  const std::string name = fmt::format("{} {}{}", child.leaf ? "light" : "node", child.number, child.usable ? " S" : "");
-  std::string line = fmt::format("{} {} {:<14}{:>7}{:>11.4g}{:>10.4g}{:>9.3g}{:>11.4g}{:>9.4f}{:>9.4f}", start,
+  const std::string name =
+      fmt::format("{} {}{}", child.leaf ? "light" : "node", child.number, child.usable ? " S" : "");
+  const std::string weight = std::isnan(child.weight) ? "-" : fmt::format("{:.4g}", child.weight);
+  std::string line = fmt::format("{} {} {:<14}{:>7}{:>11.4g}{:>10.4g}{:>9.3g}{:>11}{:>9.4f}{:>9.4f}", start,
                                  step.taken == side ? '>' : ' ', name, child.last - child.first + 1, child.intensity,
-                                 child.distance, child.bound, child.weight, child.probability, child.true_share);
+                                 child.distance, child.bound, weight, child.probability, child.true_share);
   if (visibility) line += fmt::format("{:>9.4f}", child.visible_share);
   return line + '\n';
 }
@@ -67,8 +69,9 @@ std::string steps_table(const PixelReport& report) {
   const auto& steps = report.walk.steps;
   if (steps.empty()) return "the walk ends at the root\n";
   const bool visibility = report.truth.has_visibility();
-  std::string text = fmt::format("{:>4}{:>8}{:>8}   {:<14}{:>7}{:>11}{:>10}{:>9}{:>11}{:>9}{:>9}", "step", "node",
-                                 "random", "child", "lights", "Y W/sr", "to mean m", "bound", "weight", "prob.", "true");
+  std::string text =
+      fmt::format("{:>4}{:>8}{:>8}   {:<14}{:>7}{:>11}{:>10}{:>9}{:>11}{:>9}{:>9}", "step", "node", "random", "child",
+                  "lights", "Y W/sr", "to mean m", "bound", "weight", "prob.", "true");
   text += visibility ? fmt::format("{:>9}\n", "visible") : "\n";
   for (std::size_t s = 0; s < steps.size(); ++s)
     for (const int side : {0, 1}) text += child_line(steps[s], static_cast<int>(s) + 1, side, visibility);
@@ -82,12 +85,12 @@ std::string light_text(vec3 light) { return fmt::format("Y {:.5g}  {}", luminanc
 std::string drawn_text(const PixelReport& report) {
   const ExplainedWalk& walk = report.walk;
   const DrawnLight& drawn = walk.drawn;
-  if (drawn.walk.end == WalkEnd::kDead) return "dead branch: no box below lies above the surface's horizon; the sample is black\n";
-  std::string text =
-      drawn.walk.end == WalkEnd::kLeaf
-          ? fmt::format("drawn: light {}", drawn.walk.node)
-          : fmt::format("drawn: a point of substitute {} (box {:.4g} m across)", drawn.walk.node,
-                        drawn.walk.box.diagonal());
+  if (drawn.walk.end == WalkEnd::kDead)
+    return "dead branch: no box below lies above the surface's horizon; the sample is black\n";
+  std::string text = drawn.walk.end == WalkEnd::kLeaf
+                         ? fmt::format("drawn: light {}", drawn.walk.node)
+                         : fmt::format("drawn: a point of substitute {} (box {:.4g} m across)", drawn.walk.node,
+                                       drawn.walk.box.diagonal());
   text += fmt::format(" at {}, normal {}\n", text_of(drawn.light.position), text_of(drawn.light.normal));
   text += row("intensity", light_text(drawn.light.intensity * drawn.walk.pdf) + " W/sr");
   text += row("probability", fmt::format("{:.6g} after {} steps", drawn.walk.pdf, drawn.walk.steps));
@@ -199,22 +202,23 @@ std::string tree_report_text(const TreeReport& report) {
   text += fmt::format("\nwalks: one for each of the {} surfaces of {}x{} pixels\n", walks.walks, report.width,
                       report.height);
   const std::uint64_t ended = walks.leaves + walks.substitutes;
-  text += row("end at", fmt::format("lights {}, substitutes {}, nowhere (dead branch) {}",
-                                    percent(walks.leaves, walks.walks), percent(walks.substitutes, walks.walks),
-                                    percent(walks.dead, walks.walks)));
+  text += row("end at",
+              fmt::format("lights {}, substitutes {}, nowhere (dead branch) {}", percent(walks.leaves, walks.walks),
+                          percent(walks.substitutes, walks.walks), percent(walks.dead, walks.walks)));
   text += row("steps", fmt::format("mean {:.2f}, most {}", walks.mean_steps, walks.max_steps));
   text += row("gloss lobe", percent(walks.gloss, walks.walks));
   text += row("moved to the box", percent(walks.boxed, walks.substitutes) + " of the substitutes' points");
-  text += row("inside geometry", fmt::format("{} of the substitutes' points; {} farther than the {:.3g} m that shadow "
-                                             "rays skip",
-                                             percent(walks.inside, walks.substitutes),
-                                             percent(walks.inside_beyond_offset, walks.substitutes),
-                                             report.substitute_offset));
+  text += row("inside geometry",
+              fmt::format("{} of the substitutes' points; {} farther than the {:.3g} m that shadow "
+                          "rays skip",
+                          percent(walks.inside, walks.substitutes),
+                          percent(walks.inside_beyond_offset, walks.substitutes), report.substitute_offset));
   text += row("clamped by G_max", percent(walks.clamped, ended) + " of the lights drawn");
   text += row("facing away", percent(walks.dark, ended) + " of the lights drawn");
   text += row("occluded", percent(walks.occluded, ended - walks.dark) + " of the rest");
-  text += "  inside: a ray from the point along the substitute's normal, as long as its box's diagonal, first meets the\n"
-          "  back of a triangle\n";
+  text +=
+      "  inside: a ray from the point along the substitute's normal, as long as its box's diagonal, first meets the\n"
+      "  back of a triangle\n";
   return text;
 }
 
@@ -222,42 +226,41 @@ std::string tree_report_json(const TreeReport& report) {
   const SubstituteTreeStatistics& tree = report.tree;
   const WalkStatistics& walks = report.walks;
   const std::uint64_t ended = walks.leaves + walks.substitutes;
-  Json json = {
-      {"scene", report.scene},
-      {"preset", report.preset},
-      {"diagonal_m", report.diagonal},
-      {"vpls", tree.lights},
-      {"vpl_trace_ms", report.trace_ms},
-      {"tree",
-       {{"inner_nodes", tree.inner_nodes},
-        {"build_ms", report.build_ms},
-        {"bytes_per_vpl", static_cast<double>(report.tree_bytes) / std::max(1u, tree.lights)},
-        {"depth_mean", tree.mean_depth},
-        {"depth_max", tree.max_depth},
-        {"usable_share", share_of(tree.usable_nodes, tree.inner_nodes)},
-        {"substitutes", tree.substitutes},
-        {"substituted_vpl_share", share_of(tree.substituted_lights, tree.lights)},
-        {"nu", quantile_json(tree.nu)},
-        {"sigma_normal_m", quantile_json(tree.sigma)},
-        {"substitute_diagonal_m", quantile_json(tree.substitute_diagonal)},
-        {"substitute_vpls", quantile_json(tree.substitute_lights)}}},
-      {"walks",
-       {{"width", report.width},
-        {"height", report.height},
-        {"count", walks.walks},
-        {"leaf_share", share_of(walks.leaves, walks.walks)},
-        {"substitute_share", share_of(walks.substitutes, walks.walks)},
-        {"dead_share", share_of(walks.dead, walks.walks)},
-        {"gloss_share", share_of(walks.gloss, walks.walks)},
-        {"steps_mean", walks.mean_steps},
-        {"steps_max", walks.max_steps},
-        {"boxed_share", share_of(walks.boxed, walks.substitutes)},
-        {"inside_share", share_of(walks.inside, walks.substitutes)},
-        {"inside_beyond_offset_share", share_of(walks.inside_beyond_offset, walks.substitutes)},
-        {"substitute_offset_m", report.substitute_offset},
-        {"clamped_share", share_of(walks.clamped, ended)},
-        {"facing_away_share", share_of(walks.dark, ended)},
-        {"occluded_share", share_of(walks.occluded, ended - walks.dark)}}}};
+  Json json = {{"scene", report.scene},
+               {"preset", report.preset},
+               {"diagonal_m", report.diagonal},
+               {"vpls", tree.lights},
+               {"vpl_trace_ms", report.trace_ms},
+               {"tree",
+                {{"inner_nodes", tree.inner_nodes},
+                 {"build_ms", report.build_ms},
+                 {"bytes_per_vpl", static_cast<double>(report.tree_bytes) / std::max(1u, tree.lights)},
+                 {"depth_mean", tree.mean_depth},
+                 {"depth_max", tree.max_depth},
+                 {"usable_share", share_of(tree.usable_nodes, tree.inner_nodes)},
+                 {"substitutes", tree.substitutes},
+                 {"substituted_vpl_share", share_of(tree.substituted_lights, tree.lights)},
+                 {"nu", quantile_json(tree.nu)},
+                 {"sigma_normal_m", quantile_json(tree.sigma)},
+                 {"substitute_diagonal_m", quantile_json(tree.substitute_diagonal)},
+                 {"substitute_vpls", quantile_json(tree.substitute_lights)}}},
+               {"walks",
+                {{"width", report.width},
+                 {"height", report.height},
+                 {"count", walks.walks},
+                 {"leaf_share", share_of(walks.leaves, walks.walks)},
+                 {"substitute_share", share_of(walks.substitutes, walks.walks)},
+                 {"dead_share", share_of(walks.dead, walks.walks)},
+                 {"gloss_share", share_of(walks.gloss, walks.walks)},
+                 {"steps_mean", walks.mean_steps},
+                 {"steps_max", walks.max_steps},
+                 {"boxed_share", share_of(walks.boxed, walks.substitutes)},
+                 {"inside_share", share_of(walks.inside, walks.substitutes)},
+                 {"inside_beyond_offset_share", share_of(walks.inside_beyond_offset, walks.substitutes)},
+                 {"substitute_offset_m", report.substitute_offset},
+                 {"clamped_share", share_of(walks.clamped, ended)},
+                 {"facing_away_share", share_of(walks.dark, ended)},
+                 {"occluded_share", share_of(walks.occluded, ended - walks.dark)}}}};
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
@@ -270,7 +273,7 @@ std::string pixel_report_text(const PixelReport& report) {
   text += row("roughness", fmt::format("{:.4g}", surface.roughness));
   text += row("lobe", fmt::format("{}; an image lights it here with probability {:.4g} and divides by that",
                                   name_of(report.lobe), report.lobe_probability));
-  if (report.corrects) text += row("note", "indirect.correction is left out of what follows");
+  if (!report.left_out.empty()) text += row("left out below", fmt::format("{}", fmt::join(report.left_out, ", ")));
   text += '\n' + steps_table(report) + '\n' + drawn_text(report) + '\n' + truth_text(report);
   if (report.samples) text += '\n' + samples_text(report);
   return text;

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "frame/explain.h"
 #include "methods/substitute_tree/substitute_tree_statistics.h"
@@ -14,8 +15,8 @@ struct TreeReport {
   int width = 0, height = 0;
   SubstituteTreeStatistics tree;
   WalkStatistics walks;
-  float diagonal = 1;            // D, metres
-  float substitute_offset = 0;   // metres
+  float diagonal = 1;           // D, metres
+  float substitute_offset = 0;  // metres
   std::size_t tree_bytes = 0, vpl_bytes = 0;
   double trace_ms = 0, build_ms = 0;
 };
@@ -30,7 +31,7 @@ struct PixelReport {
   ExplainedWalk walk;
   TrueLight truth;
   std::optional<SampleSummary> samples;
-  bool corrects = false;       // indirect.correction is on, but left out
+  std::vector<std::string> left_out;  // settings that add light of which the report says nothing
 };
 std::string pixel_report_text(const PixelReport& report);
 std::string pixel_report_json(const PixelReport& report);

@@ -67,7 +67,7 @@ class Drawing {
       (*lobe_ == Lobes::kGloss ? gloss : diffuse).add(i, surface, rest, 1, *lobe_ == Lobes::kGloss);
       return;
     }
-    const float p = lighting_.sampler.gloss ? diffuse_walk_probability(surface) : 1.0f;
+    const float p = diffuse_walk_probability(lighting_.sampler, surface);
     if (u.x < p)
       diffuse.add(i, surface, rest, p, false);
     else
@@ -141,9 +141,23 @@ void count_inside(const World& world, const IndirectLighting& lighting, std::spa
 
 // --- weighing ----------------------------------------------------------------------------------------------
 
+// What the walk compares: only the ratio counts.
+struct RelativeWeights {
+  float value[2], inverse[2];
+};
+
+// Equation (5) of child `side`: what it divides by is what the other child's relative weight was multiplied with.
+float weight_of(const SubstituteWalk& walk, const RelativeWeights& relative, const float* shine, const float* mean2,
+                int side) {
+  if (walk.weight == IndirectWeights::kDistanceBounded) return shine[side] / std::max(mean2[side], walk.floor2);
+  const int other = 1 - side;
+  return shine[side] * shine[other] / relative.value[other];  // NaN if the other child cannot be taken
+}
+
 // Both children of `node` by the walk's own arithmetic.
 template <bool kGloss>
-void weigh(const SubstituteWalk& walk, const SubstituteWalkPoints& points, std::uint32_t node, WeighedChild* children) {
+RelativeWeights weigh(const SubstituteWalk& walk, const SubstituteWalkPoints& points, std::uint32_t node,
+                      WeighedChild* children) {
   constexpr int L = kWalkLanes;
   std::uint32_t index[L];
   std::fill(index, index + L, node);
@@ -153,36 +167,44 @@ void weigh(const SubstituteWalk& walk, const SubstituteWalkPoints& points, std::
   const ChildLanes<L> sides[2] = {unpack_child<L>(words, walks.position),
                                   unpack_child<L>(words + kNodeWords / 2, walks.position)};
   const PairWeights<L> weights = weigh_children<L, kGloss>(walk, walks, sides[0], sides[1]);
-  float weight[2][L], shine[L], mean2[L];
-  store_lanes<L>(weights.left, weight[0]);
-  store_lanes<L>(weights.right, weight[1]);
-  const vec2 probability = child_probabilities<kGloss>(walk, points, 0, node);
+  const auto lane = [](const Lanes<L>& lanes) {
+    float stored[L];
+    store_lanes<L>(lanes, stored);
+    return stored[0];
+  };
+  const RelativeWeights relative{{lane(weights.left), lane(weights.right)},
+                                 {lane(reciprocal<L>(weights.left)), lane(reciprocal<L>(weights.right))}};
+  float shine[2], mean2[2];
   for (int side = 0; side < 2; ++side) {
     const ChildShine<L> seen = shine_of_child<L, kGloss>(walk, walks, sides[side]);
-    store_lanes<L>(seen.shine, shine);
-    store_lanes<L>(seen.mean2, mean2);
+    shine[side] = lane(seen.shine);
+    mean2[side] = lane(seen.mean2);
+  }
+  const vec2 probability = child_probabilities<kGloss>(walk, points, 0, node);
+  for (int side = 0; side < 2; ++side) {
     const ChildRecord& record = walk.tree.nodes[node].child[side];
     WeighedChild& child = children[side];
     child.number = walk.tree.nodes[node].split() + static_cast<std::uint32_t>(side);
     child.leaf = (record.mean & ChildRecord::kLeaf) != 0;
     child.usable = (record.mean & ChildRecord::kUsable) != 0;
     child.intensity = record.intensity;
-    child.distance = std::sqrt(mean2[0]);
-    child.bound = record.intensity > 0 ? shine[0] / record.intensity : 0.0f;
-    child.weight = weight[side][0];
+    child.distance = std::sqrt(mean2[side]);
+    child.bound = record.intensity > 0 ? shine[side] / record.intensity : 0.0f;
+    child.weight = weight_of(walk, relative, shine, mean2, side);
     child.probability = probability[side];
   }
+  return relative;
 }
 
 // Which child the number picks, and what is left of it: as step_substitute_walks.
-int pick(const WeighedChild* children, float& random) {
-  const float left = children[0].weight, right = children[1].weight;
+int pick(const RelativeWeights& weights, float& random) {
+  const float left = weights.value[0], right = weights.value[1];
   const float total = left + right;
   if (!(total > 0)) return -1;
   const float target = random * total;
   const int side = left > 0 ? (right > 0 && target >= left ? 1 : 0) : 1;
   const float rest = side == 1 ? target - left : target;
-  random = glm::clamp(rest / children[side].weight, 0.0f, 0x1.fffffep-1f);
+  random = glm::clamp(rest * weights.inverse[side], 0.0f, 0x1.fffffep-1f);
   return side;
 }
 
@@ -204,7 +226,7 @@ std::vector<WalkStep> explain_steps(const SubstituteWalk& walk, const Substitute
     step.node = node;
     if (s % kStepsPerNumber == 0 && s / kStepsPerNumber < 3) random = points.u[s / kStepsPerNumber][0];
     step.random = random;
-    weigh<kGloss>(walk, points, node, step.child);
+    const RelativeWeights weights = weigh<kGloss>(walk, points, node, step.child);
     const std::uint32_t split = step.child[0].number;
     step.child[0].first = first;
     step.child[0].last = split;
@@ -214,7 +236,7 @@ std::vector<WalkStep> explain_steps(const SubstituteWalk& walk, const Substitute
       child.true_share = share(truth.unoccluded, child, first, last);
       child.visible_share = share(truth.visible, child, first, last);
     }
-    step.taken = pick(step.child, random);
+    step.taken = pick(weights, random);
     // Rounding of the number must not lead elsewhere than the walk went.
     if (end.end != WalkEnd::kDead) step.taken = end.node > split ? 1 : 0;
     steps.push_back(step);
@@ -326,9 +348,8 @@ ExplainedWalk explain_walk(const World& world, const IndirectLighting& lighting,
   SubstituteWalkPoints points;
   const vec4 u = Rng{lighting.rng.seed, lighting.rng.frame, pixel}.uniform4(start.dimension);
   points.set(0, surface, vec3(u.y, u.z, u.w), lobe == Lobes::kGloss);
-  walk.steps = lobe == Lobes::kGloss
-                   ? explain_steps<true>(lighting.sampler.walk, points, walk.drawn.walk, truth)
-                   : explain_steps<false>(lighting.sampler.walk, points, walk.drawn.walk, truth);
+  walk.steps = lobe == Lobes::kGloss ? explain_steps<true>(lighting.sampler.walk, points, walk.drawn.walk, truth)
+                                     : explain_steps<false>(lighting.sampler.walk, points, walk.drawn.walk, truth);
   walk.unoccluded = unoccluded_light(lighting, surface, walk.drawn);
   walk.occluded = find_occluded(world, starts, {&walk.drawn, 1}, {&walk.unoccluded, 1})[0] != 0;
   return walk;

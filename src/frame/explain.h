@@ -52,14 +52,14 @@ vec3 unoccluded_light(const IndirectLighting& lighting, const Surface& surface, 
 // --- many walks --------------------------------------------------------------------------------------------
 
 struct WalkStatistics {
-  std::uint64_t walks = 0;  // one a surface
+  std::uint64_t walks = 0;                                         // one a surface
   std::uint64_t leaves = 0, substitutes = 0, dead = 0, gloss = 0;  // how they ended; which followed the gloss lobe
   double mean_steps = 0;
   int max_steps = 0;
-  std::uint64_t boxed = 0;      // of the substitutes
-  std::uint64_t clamped = 0;    // of all that ended
-  std::uint64_t dark = 0;       // ended where the light or the surface faces away
-  std::uint64_t occluded = 0;   // of the rest
+  std::uint64_t boxed = 0;     // of the substitutes
+  std::uint64_t clamped = 0;   // of all that ended
+  std::uint64_t dark = 0;      // ended where the light or the surface faces away
+  std::uint64_t occluded = 0;  // of the rest
   // Of the substitutes' points, those inside geometry: a ray from the point along the substitute's normal, as long as
   // the diagonal of its box, meets the back of a triangle first.
   std::uint64_t inside = 0;
@@ -77,7 +77,7 @@ struct WeighedChild {
   float intensity = 0;                // Y, W/sr
   float distance = 0;                 // to the mean, metres
   float bound = 0;                    // M: of the cosine, times the gloss lobe
-  float weight = 0;                   // equation (5)
+  float weight = 0;                   // equation (5); NaN where Yuksel's rules form none
   float probability = 0;              // 0 on a dead branch
   double true_share = 0;              // of the unoccluded light that all lights below the node send
   double visible_share = 0;           // of the light that arrives
@@ -114,7 +114,7 @@ ExplainedWalk explain_walk(const World& world, const IndirectLighting& lighting,
 struct SampleSummary {
   int samples = 0, dead = 0, occluded = 0, substitutes = 0;
   vec3 mean = vec3(0);
-  double mean_y = 0, standard_error = 0;        // Y of the radiance
+  double mean_y = 0, standard_error = 0;          // Y of the radiance
   double unoccluded_y = 0, unoccluded_error = 0;  // likewise, without shadow rays
 };
 // Samples 0 to samples - 1 of the pixel along `lobe`.

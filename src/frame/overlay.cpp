@@ -22,7 +22,7 @@ void Canvas::put(int x, int y, float depth, float coverage, vec3 colour) {
   if (x < 0 || y < 0 || x >= width_ || y >= height_ || !(coverage > 0)) return;
   const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   // What is drawn mostly lies on the very surface that it is compared with.
-  constexpr float kOnSurface = 1.01f;
+  constexpr float kOnSurface = 1.005f;
   if (!(depth <= depth_[at] * kOnSurface)) return;
   for (int c = 0; c < 3; ++c) {
     float& value = picture_[3 * at + static_cast<std::size_t>(c)];
@@ -79,8 +79,8 @@ struct Scenery {
   const World& world;
   const Settings& settings;
   CameraView camera;
-  SeenSurfaces seen;          // the whole image, through the pixels' centres
-  std::vector<float> depth;   // row by row
+  SeenSurfaces seen;         // the whole image, through the pixels' centres
+  std::vector<float> depth;  // row by row
   std::vector<float> picture;
 
   std::size_t pixels() const { return depth.size(); }
@@ -155,10 +155,11 @@ OverlayPicture draw_vpls(const Scenery& s) {
     const float brightness = std::clamp(std::pow(strength / bright, 0.4f), 0.2f, 1.0f);
     canvas.disc(point, 0.9f * line_unit(s.settings), encoded(vpl.intensity * (brightness / strength)));
   }
-  return {canvas.picture(),
-          {fmt::format("dots: VPLs in the colour of their intensity, brighter where that is higher ({} VPLs, {} of them "
-                       "on the viewer's side of their surface)",
-                       lights.vpls.size(), facing)}};
+  return {
+      canvas.picture(),
+      {fmt::format("dots: VPLs in the colour of their intensity, brighter where that is higher ({} VPLs, {} of them "
+                   "on the viewer's side of their surface)",
+                   lights.vpls.size(), facing)}};
 }
 
 // --- substitutes as ellipses -------------------------------------------------------------------------------
@@ -216,7 +217,9 @@ OverlayPicture draw_ellipses(const Scenery& s, const IndirectLighting& lighting)
                         centre.at.y < static_cast<float>(s.settings.height);
     if (inside && glm::dot(d.normal, s.camera.position - d.mean) > 0) most.emplace_back(count, node);
   }
-  const auto more = [](const auto& a, const auto& b) { return a.first != b.first ? a.first > b.first : a.second < b.second; };
+  const auto more = [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first > b.first : a.second < b.second;
+  };
   std::sort(most.begin(), most.end(), more);
   const std::size_t found = most.size();
   if (most.size() > kMostEllipses) most.resize(kMostEllipses);
@@ -276,7 +279,9 @@ ColourScale fit_scale(const std::vector<float>& values) {
     if (!std::isnan(v)) known.push_back(v);
   if (known.empty()) return {};
   std::sort(known.begin(), known.end());
-  const auto at = [&](double share) { return known[static_cast<std::size_t>(share * static_cast<double>(known.size() - 1))]; };
+  const auto at = [&](double share) {
+    return known[static_cast<std::size_t>(share * static_cast<double>(known.size() - 1))];
+  };
   const ColourScale scale{at(0.01), at(0.99)};
   return {scale.lo, std::max(scale.hi, scale.lo + 1e-3f)};
 }
@@ -318,8 +323,8 @@ OverlayPicture draw_steps(const Scenery& s, const IndirectLighting& lighting) {
   }
   return {false_colour(s.picture, steps.mean, scale),
           {legend_of("steps of a walk", scale, [](float value) { return value; }),
-           fmt::format("mean of the image {:.2f}; every pixel shows the mean of {} diffuse walks", sum / std::max(1.0, pixels),
-                       kShownWalks)}};
+           fmt::format("mean of the image {:.2f}; every pixel shows the mean of {} diffuse walks",
+                       sum / std::max(1.0, pixels), kShownWalks)}};
 }
 
 OverlayPicture draw_size(const Scenery& s, const IndirectLighting& lighting) {
@@ -327,11 +332,13 @@ OverlayPicture draw_size(const Scenery& s, const IndirectLighting& lighting) {
     return walk.end == WalkEnd::kSubstitute ? std::log10(std::max(walk.box.diagonal(), 1e-12f)) : std::nanf("");
   });
   const ColourScale scale = fit_scale(sizes.mean);
-  return {false_colour(s.picture, sizes.mean, scale),
-          {legend_of("metres across the substitute's box", scale, [](float value) { return std::pow(10.0f, value); }),
-           fmt::format("every pixel shows the geometric mean of those of {} diffuse walks that end at substitutes, {:.1f} % "
-                       "of all",
-                       kShownWalks, 100 * static_cast<double>(sizes.counted) / std::max(1.0, static_cast<double>(sizes.walks)))}};
+  return {
+      false_colour(s.picture, sizes.mean, scale),
+      {legend_of("metres across the substitute's box", scale, [](float value) { return std::pow(10.0f, value); }),
+       fmt::format(
+           "every pixel shows the geometric mean of those of {} diffuse walks that end at substitutes, {:.1f} % "
+           "of all",
+           kShownWalks, 100 * static_cast<double>(sizes.counted) / std::max(1.0, static_cast<double>(sizes.walks)))}};
 }
 
 }  // namespace

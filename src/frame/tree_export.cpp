@@ -130,21 +130,24 @@ void add_camera(Scene& scene, const CameraInstance& camera) {
 
 std::string tree_json(const World& world) {
   const SubstituteTreeView tree = world.substitutes.view();
-  std::string text = fmt::format("{{\"format\":\"lumigrove substitute tree 1\",\n\"units\":\"metres, W/sr\",\n"
-                                 "\"lights\":{},\n\"root_usable\":{},\n",
-                                 tree.count, tree.root_usable);
-  text += "\"node_columns\":[\"node\",\"level\",\"first_leaf\",\"last_leaf\",\"split\",\"lo_x\",\"lo_y\",\"lo_z\","
-          "\"hi_x\",\"hi_y\",\"hi_z\",\"mean_x\",\"mean_y\",\"mean_z\",\"normal_x\",\"normal_y\",\"normal_z\","
-          "\"sigma_major\",\"sigma_minor\",\"sigma_normal\",\"major_x\",\"major_y\",\"major_z\",\"nu\",\"intensity_r\","
-          "\"intensity_g\",\"intensity_b\",\"usable\",\"substitute\"],\n\"nodes\":[";
+  std::string text = fmt::format(
+      "{{\"format\":\"lumigrove substitute tree 1\",\n\"units\":\"metres, W/sr\",\n"
+      "\"lights\":{},\n\"root_usable\":{},\n",
+      tree.count, tree.root_usable);
+  text +=
+      "\"node_columns\":[\"node\",\"level\",\"first_leaf\",\"last_leaf\",\"split\",\"lo_x\",\"lo_y\",\"lo_z\","
+      "\"hi_x\",\"hi_y\",\"hi_z\",\"mean_x\",\"mean_y\",\"mean_z\",\"normal_x\",\"normal_y\",\"normal_z\","
+      "\"sigma_major\",\"sigma_minor\",\"sigma_normal\",\"major_x\",\"major_y\",\"major_z\",\"nu\",\"intensity_r\","
+      "\"intensity_g\",\"intensity_b\",\"usable\",\"substitute\"],\n\"nodes\":[";
   bool first = true;
   for_each_inner_node(tree, [&](const VisitedNode& node) {
     text += first ? "\n" : ",\n";
     first = false;
     append_node(text, tree, node);
   });
-  text += "],\n\"leaf_columns\":[\"x\",\"y\",\"z\",\"normal_x\",\"normal_y\",\"normal_z\",\"intensity_r\","
-          "\"intensity_g\",\"intensity_b\"],\n\"leaves\":[";
+  text +=
+      "],\n\"leaf_columns\":[\"x\",\"y\",\"z\",\"normal_x\",\"normal_y\",\"normal_z\",\"intensity_r\","
+      "\"intensity_g\",\"intensity_b\"],\n\"leaves\":[";
   for (std::uint32_t i = 0; i < tree.count; ++i) {
     const Vpl& vpl = tree.leaf(i);
     text += i > 0 ? ",\n[" : "\n[";

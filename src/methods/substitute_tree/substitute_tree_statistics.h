@@ -14,8 +14,8 @@ struct VisitedNode {
   std::uint32_t first = 0, last = 0;  // leaves below it
   int level = 0;                      // 0: the root
   bool usable = false;
-  bool below_substitute = false;      // a node above it is usable: walks that take substitutes never come here
-  Box3 box;                           // holds its lights
+  bool below_substitute = false;  // a node above it is usable: walks that take substitutes never come here
+  Box3 box;                       // holds its lights
 
   std::uint32_t lights() const { return last - first + 1; }
   // A usable node nearest the root: where walks that take substitutes stop.
@@ -61,11 +61,11 @@ struct SubstituteTreeStatistics {
   double mean_depth = 0;  // choices between two children from the root to a leaf
   int max_depth = 0;
   std::uint32_t usable_nodes = 0;
-  Quantiles nu{}, sigma{};             // of the inner nodes; sigma along the normal, metres
-  std::uint32_t substitutes = 0;       // usable nodes nearest the root
+  Quantiles nu{}, sigma{};               // of the inner nodes; sigma along the normal, metres
+  std::uint32_t substitutes = 0;         // usable nodes nearest the root
   std::uint32_t substituted_lights = 0;  // that lie below them
-  Quantiles substitute_diagonal{};     // of their boxes, metres
-  Quantiles substitute_lights{};       // below each of them
+  Quantiles substitute_diagonal{};       // of their boxes, metres
+  Quantiles substitute_lights{};         // below each of them
 };
 SubstituteTreeStatistics describe(const SubstituteTreeView& tree);
 
