@@ -110,6 +110,7 @@ TEST_F(TreeCommand, OptionsWithoutEffectAreRefused) {
   expect_refused(tree({"-o", "a.png"}), "--overlay");
   expect_refused(tree({"--overlay", "vpls", "-o", "a.png", "--pixel", "0,0"}), "--pixel");
   expect_refused(tree({"--preset", "path"}), "'path'");
+  expect_refused(tree({"--preset", "slc", "--overlay", "size", "-o", "a.png"}), "indirect.stop");
   expect_refused(tree({"--pixel", "9,9", "--gloss", "--set", "indirect.gloss=false"}), "indirect.gloss");
 }
 

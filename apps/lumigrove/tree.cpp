@@ -65,6 +65,9 @@ Settings make_tree_settings(const TreeOptions& options) {
   if (settings.indirect.transport != Transport::kVpl || settings.indirect.selection != Selection::kRoot)
     throw Error(fmt::format("this explains the substitute tree, but '{}' walks none; use --preset sst or slc",
                             settings.preset));
+  const bool needs_substitutes = options.overlay == "ellipses" || options.overlay == "size";
+  if (needs_substitutes && settings.indirect.stop != Stop::kSubstitute)
+    throw Error(fmt::format("--overlay {} shows substitutes, but indirect.stop 'leaf' uses none", options.overlay));
   if (options.gloss && !settings.indirect.gloss)
     throw Error("--gloss explains a walk that indirect.gloss = false leaves out");
   return settings;
