@@ -71,7 +71,7 @@ struct DirectLightKernel {
       u_point[walks] = vec2(u.y, u.z);
       index[walks++] = i;
     }
-    sample_trees(sampler.tree, points, walks, chosen);
+    sample_trees(sampler.tree, whole_tree(sampler.tree), points, walks, chosen);
     for (int k = 0; k < walks; ++k) {
       if (!(chosen[k].pdf > 0)) continue;
       const Emitter* emitter = &sampler.lights.emitters[chosen[k].emitter];

@@ -70,21 +70,21 @@ LUMI_HD inline GroupProbabilities group_probabilities(const LightSampler& sample
   return {share(local_flux), share(directional_flux), share(environment_flux)};
 }
 
-// Walks for the first `count` points.
-LUMI_HD inline void sample_trees(const LightTreeView& tree, const WalkPoints& points, int count,
+// Walks down `start` for the first `count` points.
+LUMI_HD inline void sample_trees(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
                                  TreeSample* samples) {
   switch (tree.count > 0 ? tree.width : 0) {
     case 0:
       for (int i = 0; i < count; ++i) samples[i] = {};
       return;
     case 2:
-      return sample_light_tree<2>(tree, points, count, samples);
+      return sample_light_tree<2>(tree, start, points, count, samples);
     case 4:
-      return sample_light_tree<4>(tree, points, count, samples);
+      return sample_light_tree<4>(tree, start, points, count, samples);
     case 8:
-      return sample_light_tree<8>(tree, points, count, samples);
+      return sample_light_tree<8>(tree, start, points, count, samples);
     default:
-      return sample_light_tree<16>(tree, points, count, samples);
+      return sample_light_tree<16>(tree, start, points, count, samples);
   }
 }
 
@@ -92,21 +92,21 @@ LUMI_HD inline TreeSample sample_tree(const LightTreeView& tree, vec3 x, vec3 n,
   WalkPoints points;
   points.set(0, x, n, u);
   TreeSample sample;
-  sample_trees(tree, points, 1, &sample);
+  sample_trees(tree, whole_tree(tree), points, 1, &sample);
   return sample;
 }
 
-LUMI_HD inline float pdf_tree(const LightTreeView& tree, vec3 x, vec3 n, std::uint32_t emitter) {
+LUMI_HD inline float pdf_tree(const LightTreeView& tree, Subtree start, vec3 x, vec3 n, std::uint32_t emitter) {
   if (tree.count == 0) return 0;
   switch (tree.width) {
     case 2:
-      return pdf_light_tree<2>(tree, x, n, emitter);
+      return pdf_light_tree<2>(tree, start, x, n, emitter);
     case 4:
-      return pdf_light_tree<4>(tree, x, n, emitter);
+      return pdf_light_tree<4>(tree, start, x, n, emitter);
     case 8:
-      return pdf_light_tree<8>(tree, x, n, emitter);
+      return pdf_light_tree<8>(tree, start, x, n, emitter);
     default:
-      return pdf_light_tree<16>(tree, x, n, emitter);
+      return pdf_light_tree<16>(tree, start, x, n, emitter);
   }
 }
 
@@ -139,7 +139,7 @@ LUMI_HD inline float pdf_choose_emitter(const LightSampler& sampler, const Surfa
     case LightChoice::kPower:
       return sampler.alias.pdf(emitter_flux(sampler.lights, emitter));
     case LightChoice::kTree:
-      return pdf_tree(sampler.tree, surface.position, surface.normal, emitter);
+      return pdf_tree(sampler.tree, whole_tree(sampler.tree), surface.position, surface.normal, emitter);
     case LightChoice::kOne:
       break;
   }

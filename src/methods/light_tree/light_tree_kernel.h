@@ -73,6 +73,18 @@ struct LightTreeView {
   }
 };
 
+// Children first, ..., first + children - 1 of a node, and all lights below them: where a walk starts. As nodes are W wide
+// and whole binary trees of their children, every subtree of the binary tree is such a range of 1, 2, 4, ... children.
+struct Subtree {
+  std::uint32_t node = 0;  // of its level
+  std::int16_t level = 0;
+  std::uint8_t first = 0, children = 0;
+};
+
+LUMI_HD inline Subtree whole_tree(const LightTreeView& tree) {
+  return {0, 0, 0, static_cast<std::uint8_t>(tree.root_children)};
+}
+
 // Boxes, and what shines in them, one a lane: the children of a node, or one child for many points.
 template <int W>
 struct BoxLanes {
@@ -147,12 +159,20 @@ struct ChildWeights {
   float total;          // 0: no child can contribute
 };
 
-// Equations 1 and 2 for the W children of a node at once.
+// 1 in lanes first, ..., first + count - 1, elsewhere 0.
 template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
-                                                          vec3 x, vec3 n) {
+LUMI_HD inline Lanes<W> lanes_in_range(int first, int count) {
+  float lanes[W];
+  for (int c = 0; c < W; ++c) lanes[c] = c >= first && c < first + count ? 1.0f : 0.0f;
+  return load_lanes<W>(lanes);
+}
+
+// Equations 1 and 2 for the W children of a node at once. `lanes` are the node's boxes, those that do not count without intensity.
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node, bool cones,
+                                                          float inside2, vec3 x, vec3 n) {
   const BoxWeights<W> boxes = weigh_boxes<W>(
-      load_boxes<W>(node), cones, [&] { return load_cones<W>(node); }, inside2, broadcast<W>(x), broadcast<W>(n));
+      lanes, cones, [&] { return load_cones<W>(node); }, inside2, broadcast<W>(x), broadcast<W>(n));
   // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
   const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
   const Lanes<W> near = select_lanes<W>(is_inside, boxes.inside, boxes.near);
@@ -162,6 +182,12 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& no
   const Lanes<W> scale = broadcast<W>(far_total / near_sums[W - 1]);
   return {multiply_add<W>(near, scale, boxes.far), multiply_add<W>(near_sums, scale, far_sums),
           far_total + far_total};
+}
+
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
+                                                          vec3 x, vec3 n) {
+  return weigh_children<W>(load_boxes<W>(node), node, cones, inside2, x, n);
 }
 
 struct ChosenChild {
@@ -221,11 +247,13 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefix_sums_across(Lanes<P> (&a)[W]) {
     for (int c = W - 1; c >= by; --c) a[c] = a[c] + a[c - by];
 }
 
-// The step from the root, where all walks are at one node: P points at once, child by child, instead of W children
-// at once. A root with few children then costs little.
+// The first step, which all walks take from one node: P points at once, child by child, instead of W children at once. A
+// start with few children then costs little.
 template <int W, int P>
-LUMI_HD inline void step_from_root(const LightTreeView& tree, const WalkPoints& points, int first, WalkState& state) {
-  const LightNode<W>& root = *tree.level<W>(0);
+LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, const WalkPoints& points, int first,
+                                    WalkState& state) {
+  const LightNode<W>& node = tree.level<W>(start.level)[start.node];
+  const int begin = start.first, end = start.first + start.children;
   const Lanes<P> zero = broadcast<P>(0);
   const LaneVec3<P> x{load_lanes<P>(points.x + first), load_lanes<P>(points.y + first),
                       load_lanes<P>(points.z + first)};
@@ -234,16 +262,16 @@ LUMI_HD inline void step_from_root(const LightTreeView& tree, const WalkPoints& 
   Lanes<P> near[W], far[W], inside[W];
   Lanes<P> most_inside = zero;
   for (int c = 0; c < W; ++c) near[c] = far[c] = inside[c] = zero;
-  for (int c = 0; c < tree.root_children; ++c) {
+  for (int c = begin; c < end; ++c) {
     const BoxWeights<P> box = weigh_boxes<P>(
-        broadcast_box<P>(root, c), tree.first_cones == 0, [&] { return broadcast_cone<P>(root, c); }, tree.inside2,
+        broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.inside2,
         x, n);
     near[c] = box.near;
     far[c] = box.far;
     inside[c] = box.inside;
     most_inside = max_lanes<P>(most_inside, box.inside);
   }
-  for (int c = 0; c < tree.root_children; ++c)
+  for (int c = begin; c < end; ++c)
     near[c] = choose_where_greater<P>(most_inside, zero, inside[c], near[c]);
 
   Lanes<P> near_sums[W], far_sums[W];
@@ -259,7 +287,7 @@ LUMI_HD inline void step_from_root(const LightTreeView& tree, const WalkPoints& 
 
   // From the last child to the first: the last of positive weight, then every one whose sum is beyond the target.
   Lanes<P> lane = zero, weight = zero, sum = zero, any = zero;
-  for (int c = tree.root_children - 1; c >= 0; --c) {
+  for (int c = end - 1; c >= begin; --c) {
     const Lanes<P> child_weight = multiply_add<P>(near[c], scale, far[c]);
     const Lanes<P> child_sum = multiply_add<P>(near_sums[c], scale, far_sums[c]);
     const Lanes<P> beyond = choose_where_greater<P>(child_sum, target, child_weight, zero);
@@ -276,7 +304,7 @@ LUMI_HD inline void step_from_root(const LightTreeView& tree, const WalkPoints& 
   store_lanes<P>(weight / total, state.pdf + first);
   store_lanes<P>(min_lanes<P>(max_lanes<P>(rest, zero), broadcast<P>(0x1.fffffep-1f)), state.r + first);
   for (int i = 0; i < P; ++i) {
-    state.node[first + i] = totals[i] > 0 ? static_cast<std::uint32_t>(lanes[i]) : 0;
+    state.node[first + i] = start.node * W + (totals[i] > 0 ? static_cast<std::uint32_t>(lanes[i]) : 0);
     if (!(totals[i] > 0)) state.pdf[first + i] = 0;
   }
 }
@@ -314,38 +342,44 @@ LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkP
   state.living = kept;
 }
 
-// One walk from the root for each of the first `count` points.
+// One walk down `start` for each of the first `count` points. start.children > 0.
 template <int W>
-LUMI_HD inline void sample_light_tree(const LightTreeView& tree, const WalkPoints& points, int count,
+LUMI_HD inline void sample_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
                                       TreeSample* samples) {
   constexpr int kPoints = kWalkBatch < 16 ? kWalkBatch : 16;
   WalkState state;
   state.living = 0;
-  for (int first = 0; first < count; first += kPoints) step_from_root<W, kPoints>(tree, points, first, state);
+  for (int first = 0; first < count; first += kPoints)
+    step_from_start<W, kPoints>(tree, start, points, first, state);
   for (int i = 0; i < count; ++i) {
     samples[i] = {};
     state.alive[state.living] = i;
     state.living += state.pdf[i] > 0 ? 1 : 0;
-    prefetch_step<W>(tree, 1, state.node[i]);
+    prefetch_step<W>(tree, start.level + 1, state.node[i]);
   }
-  for (int level = 1; level < tree.levels; ++level) step_down<W>(tree, points, level, state);
+  for (int level = start.level + 1; level < tree.levels; ++level) step_down<W>(tree, points, level, state);
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
     samples[i] = {tree.leaf_emitters[state.node[i]], state.pdf[i]};
   }
 }
 
-// Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same order.
+// Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same order. 0 for an
+// emitter that is not below `start`.
 template <int W>
-LUMI_HD inline float pdf_light_tree(const LightTreeView& tree, vec3 x, vec3 n, std::uint32_t emitter) {
+LUMI_HD inline float pdf_light_tree(const LightTreeView& tree, Subtree start, vec3 x, vec3 n, std::uint32_t emitter) {
   const std::uint32_t leaf = tree.emitter_leaves[emitter];
   if (leaf == kNoEmitter) return 0;
   std::uint32_t span = 1;  // leaves below a child of the current level
-  for (int level = 1; level < tree.levels; ++level) span *= W;
+  for (int level = start.level + 1; level < tree.levels; ++level) span *= W;
+  const std::uint32_t lane = leaf / span % W;
+  if (leaf / span / W != start.node || lane < start.first || lane >= start.first + start.children) return 0;
   float pdf = 1;
-  for (int level = 0; level < tree.levels; ++level, span /= W) {
+  for (int level = start.level; level < tree.levels; ++level, span /= W) {
     const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
-    const ChildWeights<W> children = weigh_children<W>(node, level >= tree.first_cones, tree.inside2, x, n);
+    BoxLanes<W> boxes = load_boxes<W>(node);
+    if (level == start.level) boxes.intensity = boxes.intensity * lanes_in_range<W>(start.first, start.children);
+    const ChildWeights<W> children = weigh_children<W>(boxes, node, level >= tree.first_cones, tree.inside2, x, n);
     if (!(children.total > 0)) return 0;
     alignas(64) float weights[W];
     store_lanes<W>(children.weight, weights);
