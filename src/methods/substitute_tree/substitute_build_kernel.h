@@ -178,17 +178,12 @@ struct SubstituteMergeKernel {
     float weight;
   };
   LUMI_HD LUMI_ALWAYS_INLINE Child load_child(std::uint32_t number, bool leaf) const {
-    Child child;
     if (leaf) {
-      child.distribution = leaf_distribution(vpls[leaves[number]]);
-      const vec3 p = child.distribution.mean;
-      child.extent = {{p, p}, pack_normal(child.distribution.normal), ChildRecord::kLeaf};
-    } else {
-      child.distribution = distributions[number];
-      child.extent = extents[number];
+      const Vpl& vpl = vpls[leaves[number]];
+      const vec3 p = vpl.position;
+      return {leaf_distribution(vpl), {{p, p}, pack_normal(vpl.normal), ChildRecord::kLeaf}, luminance(vpl.intensity)};
     }
-    child.weight = luminance(child.distribution.intensity);
-    return child;
+    return {distributions[number], extents[number], luminance(distributions[number].intensity)};
   }
 
   LUMI_HD void make_node(std::uint32_t number, std::uint32_t split, bool left_leaf, bool right_leaf) const {

@@ -130,9 +130,9 @@ inline constexpr int kNodeWords = sizeof(SubstituteNode) / sizeof(float);
 template <int L>
 LUMI_HD LUMI_ALWAYS_INLINE void load_nodes(const SubstituteNode* nodes, const std::uint32_t* index,
                                            Lanes<L> (&words)[kNodeWords]) {
-#pragma GCC unroll 2
+  LUMI_UNROLL(2)
   for (int part = 0; part < kNodeWords; part += L) {
-#pragma GCC unroll 16
+    LUMI_UNROLL(16)
     for (int i = 0; i < L; ++i)
       words[part + i] = load_lanes<L>(reinterpret_cast<const float*>(nodes + index[i]) + part);
     transpose_lanes<L>(words + part);
