@@ -228,7 +228,7 @@ LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> direction_in_box(const LaneVec3<L>& r, co
       const Lanes<L> cosine = dot<L>(p, r) * scale;
       // Behind the surface's mirror direction, or without a direction: no candidate.
       const Lanes<L> valid = min_lanes<L>(min_lanes<L>(usable, t), length2);
-      const Lanes<L> better = choose_where_greater<L>(valid, zero, cosine - best_cosine, broadcast<L>(-1));
+      const Lanes<L> better = choose_where_greater<L>(cosine, best_cosine, valid, zero);
       best_cosine = choose_where_greater<L>(better, zero, cosine, best_cosine);
       best.x = choose_where_greater<L>(better, zero, p.x * scale, best.x);
       best.y = choose_where_greater<L>(better, zero, p.y * scale, best.y);
@@ -249,7 +249,8 @@ LUMI_HD LUMI_ALWAYS_INLINE Lanes<L> gloss_towards(const WalkLanes<L>& walks, con
   const LaneVec3<L> h{w.x + walks.wo.x, w.y + walks.wo.y, w.z + walks.wo.z};
   const Lanes<L> n_h = dot<L>(walks.normal, h), h2 = dot<L>(h, h);
   // As ggx_normal_density; |h - n (n h)|^2 = h2 - n_h^2 is good enough for a weight.
-  const Lanes<L> q = multiply_add<L>(walks.alpha2, n_h * n_h, max_lanes<L>(h2 - n_h * n_h, zero));
+  const Lanes<L> aside2 = max_lanes<L>(multiply_add<L>(zero - n_h, n_h, h2), zero);
+  const Lanes<L> q = multiply_add<L>(walks.alpha2, n_h * n_h, aside2);
   const Lanes<L> density = walks.alpha2 * (h2 * h2) / max_lanes<L>(q * q, broadcast<L>(1e-30f));
   const Lanes<L> k = walks.alpha2 * 0.5f;
   const Lanes<L> cosine = max_lanes<L>(dot<L>(walks.normal, w), zero);
