@@ -320,27 +320,26 @@ struct PairWeights {
   Lanes<L> left, right;
 };
 
-// Equation 5 for both children.
+// Equation 5 for both children, times what the distances of both divide by: the shares are the same.
 template <int L, bool kGloss>
 LUMI_HD LUMI_ALWAYS_INLINE PairWeights<L> weigh_children(const SubstituteWalk& walk, const WalkLanes<L>& walks,
                                                          const ChildLanes<L>& left, const ChildLanes<L>& right) {
   const ChildShine<L> a = shine_of_child<L, kGloss>(walk, walks, left);
   const ChildShine<L> b = shine_of_child<L, kGloss>(walk, walks, right);
-  const Lanes<L> floor2 = broadcast<L>(walk.floor2), one = broadcast<L>(1);
+  const Lanes<L> floor2 = broadcast<L>(walk.floor2), one = broadcast<L>(1), zero = broadcast<L>(0);
   if (walk.weight == IndirectWeights::kDistanceBounded)
-    return {a.shine / max_lanes<L>(a.mean2, floor2), b.shine / max_lanes<L>(b.mean2, floor2)};
-  Lanes<L> divide_a = a.near2, divide_b = b.near2;
+    return {a.shine * max_lanes<L>(b.mean2, floor2), b.shine * max_lanes<L>(a.mean2, floor2)};
+  Lanes<L> divide_a, divide_b;
   if (walk.weight == IndirectWeights::kInBox) {
-    const Lanes<L> zero = broadcast<L>(0);
     divide_a = choose_where_greater<L>(a.near2, zero, max_lanes<L>(a.mean2, floor2), one);
     divide_b = choose_where_greater<L>(b.near2, zero, max_lanes<L>(b.mean2, floor2), one);
   } else {
     // Either child's box is wider than far away: distances would say nothing. Two lights have no width.
     const Lanes<L> too_near = max_lanes<L>(a.diagonal2 - a.near2, b.diagonal2 - b.near2);
-    divide_a = choose_where_greater<L>(too_near, broadcast<L>(0), one, max_lanes<L>(a.near2, floor2));
-    divide_b = choose_where_greater<L>(too_near, broadcast<L>(0), one, max_lanes<L>(b.near2, floor2));
+    divide_a = choose_where_greater<L>(too_near, zero, one, max_lanes<L>(a.near2, floor2));
+    divide_b = choose_where_greater<L>(too_near, zero, one, max_lanes<L>(b.near2, floor2));
   }
-  return {a.shine / divide_a, b.shine / divide_b};
+  return {a.shine * divide_b, b.shine * divide_a};
 }
 
 // --- walks -------------------------------------------------------------------------------------------------
@@ -379,7 +378,7 @@ LUMI_HD LUMI_ALWAYS_INLINE bool step_substitute_walks(const SubstituteWalk& walk
   // target == left counts as beyond: r = left / total leaves [left, total) to the right child.
   const Lanes<L> side = choose_where_greater<L>(zero, go_right, zero, one);
   const Lanes<L> weight = choose_where_greater<L>(side, zero, weights.right, weights.left);
-  const Lanes<L> rest = choose_where_greater<L>(side, zero, target - weights.left, target) / weight;
+  const Lanes<L> rest = choose_where_greater<L>(side, zero, target - weights.left, target) * reciprocal<L>(weight);
   const Lanes<L> going = load_lanes<L>(state.going + first);
   const Lanes<L> alive = choose_where_greater<L>(total, zero, going, zero);
 
@@ -397,7 +396,7 @@ LUMI_HD LUMI_ALWAYS_INLINE bool step_substitute_walks(const SubstituteWalk& walk
     store_lanes<L>(choose_where_greater<L>(where, zero, now, load_lanes<L>(kept)), kept);
   };
   const Lanes<L> pdf = load_lanes<L>(state.pdf + first);
-  const Lanes<L> stepped = choose_where_greater<L>(total, zero, pdf * (weight / total), zero);
+  const Lanes<L> stepped = choose_where_greater<L>(total, zero, pdf * (weight * reciprocal<L>(total)), zero);
   store_lanes<L>(choose_where_greater<L>(going, zero, stepped, pdf), state.pdf + first);
   store_lanes<L>(min_lanes<L>(max_lanes<L>(rest, zero), broadcast<L>(0x1.fffffep-1f)), state.r + first);
   store_lanes<L>(load_lanes<L>(state.steps + first) + going, state.steps + first);
@@ -476,8 +475,8 @@ LUMI_HD inline vec2 child_probabilities(const SubstituteWalk& walk, const Substi
                                 unpack_child<L>(words + kNodeWords / 2, walks.position));
   const Lanes<L> total = weights.left + weights.right;
   float left[L], right[L], totals[L];
-  store_lanes<L>(weights.left / total, left);
-  store_lanes<L>(weights.right / total, right);
+  store_lanes<L>(weights.left * reciprocal<L>(total), left);
+  store_lanes<L>(weights.right * reciprocal<L>(total), right);
   store_lanes<L>(total, totals);
   return totals[i - first] > 0 ? vec2(left[i - first], right[i - first]) : vec2(0);
 }
