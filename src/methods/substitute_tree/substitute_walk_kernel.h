@@ -14,6 +14,8 @@
 //             relative margin of 2e-6, so that rounding never makes a light at the horizon impossible.
 //             The gloss lobe is floored by its own tail, never 0, so that no box above the horizon is a dead branch.
 //             With `cones`, weights also bound the cosine at the lights (paper: none).
+//             Where stochastic lightcuts' baseline leaves the distance out (kInBox) it is one unit of the demos, whose
+//             scenes measure some 4.64: leaving it out would make probabilities depend on the unit of length.
 //             Random numbers are not re-stretched for more than kStepsPerNumber steps.
 // Estimator   The walk itself is exact: every light that can contribute at x has positive probability, and the
 //             probability returned is that of the steps taken. Drawing from substitutes is biased: they are not where
@@ -37,6 +39,7 @@ struct SubstituteWalk {
   float floor2 = 0;        // epsilon^2, m^2: least squared distance
   bool cones = false;      // bound the cosine at the lights
   bool substitutes = true; // stop at usable nodes
+  float inside2 = 1;       // m^2: squared distance that kInBox takes where x lies in the box
 };
 
 #if defined(__CUDACC__)
@@ -331,8 +334,9 @@ LUMI_HD LUMI_ALWAYS_INLINE PairWeights<L> weigh_children(const SubstituteWalk& w
     return {a.shine * max_lanes<L>(b.mean2, floor2), b.shine * max_lanes<L>(a.mean2, floor2)};
   Lanes<L> divide_a, divide_b;
   if (walk.weight == IndirectWeights::kInBox) {
-    divide_a = choose_where_greater<L>(a.near2, zero, max_lanes<L>(a.mean2, floor2), one);
-    divide_b = choose_where_greater<L>(b.near2, zero, max_lanes<L>(b.mean2, floor2), one);
+    const Lanes<L> inside2 = broadcast<L>(walk.inside2);
+    divide_a = choose_where_greater<L>(a.near2, zero, max_lanes<L>(a.mean2, floor2), inside2);
+    divide_b = choose_where_greater<L>(b.near2, zero, max_lanes<L>(b.mean2, floor2), inside2);
   } else {
     // Either child's box is wider than far away: distances would say nothing. Two lights have no width.
     const Lanes<L> too_near = max_lanes<L>(a.diagonal2 - a.near2, b.diagonal2 - b.near2);
