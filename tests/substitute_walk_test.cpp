@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <limits>
-#include <map>
 
 #include "methods/vpl_sampling/vpl_sampler_kernel.h"
 #include "statistics.h"
@@ -115,10 +113,15 @@ Ends enumerate_ends(const SubstituteWalk& walk, bool gloss, const SubstituteWalk
   return ends;
 }
 
+// In one place: inlined in several, products and sums of frames and mirror directions may be fused differently.
+[[gnu::noinline]] void set_point(SubstituteWalkPoints& points, int i, const Surface& surface, vec3 numbers) {
+  points.set(i, surface, numbers, true);
+}
+
 SubstituteWalkPoints points_of(std::span<const Surface> surfaces, Stream& random) {
   SubstituteWalkPoints points;
   for (std::size_t i = 0; i < surfaces.size(); ++i)
-    points.set(static_cast<int>(i), surfaces[i], vec3(random.next()), true);
+    set_point(points, static_cast<int>(i), surfaces[i], vec3(random.next()));
   return points;
 }
 
@@ -142,7 +145,8 @@ TEST(SubstituteWalk, ProbabilitiesOfTheLeavesSumToOneLessDeadBranches) {
   const std::vector<Surface> surfaces = walk_surfaces(24);
   Stream random(1);
   const SubstituteWalkPoints points = points_of(surfaces, random);
-  int whole = 0, dead = 0, partly = 0;
+  int whole = 0, dead = 0;
+  RunningMean lost;
   for_every_walk(false, [&](const SubstituteWalk& walk, bool gloss) {
     for (int i = 0; i < 24; ++i) {
       const Ends ends = enumerate_ends(walk, gloss, points, i);
@@ -153,12 +157,15 @@ TEST(SubstituteWalk, ProbabilitiesOfTheLeavesSumToOneLessDeadBranches) {
         sum += p;
       }
       ASSERT_NEAR(sum + ends.probability.back(), 1, 1e-4) << "point " << i;
-      (sum > 1 - 1e-4 ? whole : sum < 1e-4 ? dead : partly)++;
+      whole += sum > 1 - 1e-4;
+      dead += sum < 1e-4;
+      if (sum > 1e-4) lost.add(1 - sum);
     }
   });
-  // A box above the horizon may hold none but boxes below: then a part is lost, seldom.
-  EXPECT_GT(whole, 10 * partly);
+  // A box above the horizon may hold none but boxes below it: then a part is lost.
+  EXPECT_GT(whole, 1000);
   EXPECT_GT(dead, 50);
+  EXPECT_LT(lost.mean(), 0.15);
 }
 
 TEST(SubstituteWalk, FiveThousandLightsSumToOne) {
@@ -190,7 +197,7 @@ Frequencies count_ends(const SubstituteWalk& walk, bool gloss, const Surface& su
   std::array<WalkResult, kSubstituteWalks> results;
   for (int batch = 0; batch < batches; ++batch) {
     const int count = batch % 2 == 0 ? kSubstituteWalks : 1 + batch % kSubstituteWalks;
-    for (int i = 0; i < count; ++i) points.set(i, surface, vec3(random.next()), true);
+    for (int i = 0; i < count; ++i) set_point(points, i, surface, vec3(random.next()));
     walk_all(walk, gloss, points, count, results.data());
     for (int i = 0; i < count; ++i) {
       ++seen.counts[end_index(walk.tree, results[static_cast<std::size_t>(i)])];
@@ -209,7 +216,7 @@ void expect_ends_as_enumerated(bool substitutes) {
     const std::vector<Surface> surfaces = walk_surfaces(3, 50 + static_cast<std::uint32_t>(tested++ % 5));
     for (const Surface& surface : surfaces) {
       SubstituteWalkPoints one;
-      one.set(0, surface, vec3(0), true);
+      set_point(one, 0, surface, vec3(0));
       const Ends ends = enumerate_ends(walk, gloss, one, 0);
       const Frequencies seen =
           count_ends(walk, gloss, surface, 60, random, [&](const SubstituteWalkPoints&, int, const WalkResult& result) {
@@ -239,7 +246,7 @@ TEST(SubstituteWalk, FrequenciesOverManyStepsFollowTheirProbabilities) {
     Stream random(5);
     for (const Surface& surface : walk_surfaces(3)) {
       SubstituteWalkPoints one;
-      one.set(0, surface, vec3(0), true);
+      set_point(one, 0, surface, vec3(0));
       const Ends ends = enumerate_ends(walk, false, one, 0);
       const Frequencies seen =
           count_ends(walk, false, surface, 2500, random, [](const SubstituteWalkPoints&, int, const WalkResult&) {});
@@ -272,7 +279,7 @@ TEST(SubstituteWalk, ReportsThePdfOfItsLeafBitForBit) {
 
 // --- nothing is left out -----------------------------------------------------------------------------------------
 
-// `low`: near the horizon, where rounding decides.
+// Every other one has a light near its horizon, where rounding decides.
 std::vector<Surface> surfaces_for(const NamedVpls& set, int n, vec3 origin) {
   std::vector<Surface> surfaces = walk_surfaces(n, 71);
   Stream random(72);
@@ -301,7 +308,7 @@ void expect_nothing_left_out(const NamedVpls& set, const std::vector<Surface>& s
       const Lobes lobe = config.gloss ? Lobes::kGloss : Lobes::kDiffuse;
       for (const Surface& surface : surfaces) {
         SubstituteWalkPoints points;
-        points.set(0, surface, vec3(random.next()), true);
+        set_point(points, 0, surface, vec3(random.next()));
         const Ends ends = enumerate_ends(walk, config.gloss, points, 0);
         for (std::uint32_t leaf = 0; leaf < view.count; ++leaf) {
           const Vpl& vpl = view.leaf(leaf);
@@ -356,9 +363,9 @@ TEST(SubstituteWalk, ResultDependsOnNeitherLaneNorBatch) {
       constexpr int kTurn = 5, kSome = kSubstituteWalks / 2 - 3;
       for (int i = 0; i < kSubstituteWalks; ++i) {
         const auto k = static_cast<std::size_t>(i);
-        all.set(i, surfaces[k], numbers[k], true);
-        turned.set((i + kTurn) % kSubstituteWalks, surfaces[k], numbers[k], true);
-        if (i < kSome) some.set(i, surfaces[k], numbers[k], true);
+        set_point(all, i, surfaces[k], numbers[k]);
+        set_point(turned, (i + kTurn) % kSubstituteWalks, surfaces[k], numbers[k]);
+        if (i < kSome) set_point(some, i, surfaces[k], numbers[k]);
       }
       walk_all(walk, gloss, all, kSubstituteWalks, a.data());
       walk_all(walk, gloss, turned, kSubstituteWalks, b.data());
@@ -367,7 +374,7 @@ TEST(SubstituteWalk, ResultDependsOnNeitherLaneNorBatch) {
         expect_same(a[i], b[(i + kTurn) % kSubstituteWalks]);
         if (i < kSome) expect_same(a[i], c[i]);
         if (i % 7 != 0) continue;
-        alone.set(0, surfaces[i], numbers[i], true);
+        set_point(alone, 0, surfaces[i], numbers[i]);
         walk_all(walk, gloss, alone, 1, d.data());
         expect_same(a[i], d[0]);
       }
@@ -389,6 +396,7 @@ TEST(SubstituteWalk, ScalingTheSceneChangesNoWalk) {
             const SubstituteWalk here = a.walk(config.weight, config.cones, substitutes);
             SubstituteWalk there = b.walk(config.weight, config.cones, substitutes);
             there.floor2 *= scale * scale;
+            there.inside2 *= scale * scale;
             std::vector<Surface> surfaces = walk_surfaces(kSubstituteWalks, 91);
             Stream random(9), again(9);
             const SubstituteWalkPoints points = points_of(surfaces, random);
@@ -399,16 +407,17 @@ TEST(SubstituteWalk, ScalingTheSceneChangesNoWalk) {
             walk_all(there, config.gloss, scaled_points, kSubstituteWalks, other.data());
             for (std::size_t i = 0; i < kSubstituteWalks; ++i) {
               ++walks;
-              const bool end = one[i].end == other[i].end && one[i].node == other[i].node;
-              same += end && std::abs(one[i].pdf - other[i].pdf) <= 1e-3f * one[i].pdf;
-              if (scale == 1024.0f) ASSERT_NO_FATAL_FAILURE(expect_same(one[i], other[i]));
+              same += one[i].end == other[i].end && one[i].node == other[i].node;
+              if (scale == 1024.0f) {
+                ASSERT_NO_FATAL_FAILURE(expect_same(one[i], other[i]));
+              }
             }
           }
         }
       }
     }
-    // By 1000 coordinates are rounded otherwise: a few points lie in a box no more, and a few numbers at an edge.
-    EXPECT_GT(same, 0.99 * walks) << same << " of " << walks;
+    // By 1000 the extents of boxes are rounded to other 8 bits, up to 1/128 larger: probabilities change that little.
+    EXPECT_GT(same, 0.97 * walks) << same << " of " << walks;
   }
 }
 
@@ -519,11 +528,11 @@ struct Oracle {
 
   // Both children's weights. `certain` as in Value.
   std::array<double, 2> pair(const Value& a, const Value& b, bool& certain) const {
-    const double floor2 = static_cast<double>(walk.floor2);
+    const double floor2 = static_cast<double>(walk.floor2), inside2 = static_cast<double>(walk.inside2);
     const auto by_rule = [&](const Value& v) {
       switch (walk.weight) {
         case IndirectWeights::kDistanceBounded: return std::max(v.mean2, floor2);
-        case IndirectWeights::kInBox: return v.near2 > 0 ? std::max(v.mean2, floor2) : 1;
+        case IndirectWeights::kInBox: return v.near2 > 0 ? std::max(v.mean2, floor2) : inside2;
         default: break;
       }
       const bool wide = a.diagonal2 > a.near2 || b.diagonal2 > b.near2;
@@ -537,27 +546,13 @@ struct Oracle {
   }
 };
 
-template <bool kGloss>
-std::array<double, 2> weights_of_walk(const SubstituteWalk& walk, const SubstituteWalkPoints& points,
-                                      std::uint32_t node) {
-  constexpr int L = kWalkLanes;
-  std::uint32_t index[L];
-  std::fill(index, index + L, node);
-  const WalkLanes<L> walks = load_walks<L, kGloss>(points, 0);
-  Lanes<L> words[kNodeWords];
-  load_nodes<L>(walk.tree.nodes, index, words);
-  const PairWeights<L> weights = weigh_children<L, kGloss>(walk, walks, unpack_child<L>(words, walks.position),
-                                                           unpack_child<L>(words + kNodeWords / 2, walks.position));
-  return {static_cast<double>(weights.left[0]), static_cast<double>(weights.right[0])};
-}
-
 TEST(SubstituteWalk, WeightsAreThoseOfEquationFive) {
   int compared = 0, uncertain = 0;
   for_every_walk(false, [&](const SubstituteWalk& walk, bool gloss) {
     for (Surface surface : walk_surfaces(18, 101)) {
       surface.roughness = std::max(surface.roughness, 0.3f);  // narrower lobes are good enough with fewer digits
       SubstituteWalkPoints points;
-      points.set(0, surface, vec3(0.5f), true);
+      set_point(points, 0, surface, vec3(0.5f));
       const Oracle oracle{walk, surface, gloss};
       for (std::uint32_t node = 0; node + 1 < walk.tree.count; node += 1 + node / 8) {
         const Oracle::Value a = oracle.child(walk.tree.nodes[node].child[0]);
@@ -568,10 +563,18 @@ TEST(SubstituteWalk, WeightsAreThoseOfEquationFive) {
           ++uncertain;
           continue;
         }
-        const std::array<double, 2> found = gloss ? weights_of_walk<true>(walk, points, node)
-                                                  : weights_of_walk<false>(walk, points, node);
-        ASSERT_NEAR(found[0], expected[0], expected[0] * std::max(1e-3, a.slack)) << "node " << node;
-        ASSERT_NEAR(found[1], expected[1], expected[1] * std::max(1e-3, b.slack)) << "node " << node;
+        const vec2 found = probabilities(walk, gloss, points, 0, node);
+        const double total = expected[0] + expected[1];
+        if (!(total > 0)) {
+          ASSERT_EQ(found, vec2(0)) << "node " << node;
+          continue;
+        }
+        // Roots have 14 bits; the lobe falls by a power of their errors.
+        const double tolerance = std::max(gloss ? 3e-3 : 1e-3, a.slack + b.slack);
+        for (int side = 0; side < 2; ++side) {
+          const double p = expected[static_cast<std::size_t>(side)] / total;
+          ASSERT_NEAR(found[side], p, p * tolerance) << "node " << node;
+        }
         ++compared;
       }
     }
@@ -626,7 +629,8 @@ TEST(DirectionInBox, IsRWhereRMeetsTheBox) {
     if (!meets_box(c.r, c.lo, c.hi, -1e-4) && !(glm::length(c.hi - c.lo) == 0)) continue;
     ++met;
     const dvec3 w = found_direction(c.r, c.lo, c.hi);
-    EXPECT_GT(glm::dot(glm::normalize(w), dvec3(c.r)), 1 - 1e-6);
+    // Cosines have 14 bits, so that another clamped point may win: 0.7 degrees.
+    EXPECT_GT(glm::dot(glm::normalize(w), dvec3(c.r)), 1 - 7.5e-5);
     EXPECT_NEAR(glm::length(w), 1, 1e-4);
   }
   EXPECT_GT(met, 500);
@@ -641,33 +645,34 @@ TEST(DirectionInBox, IsRWithinTheBox) {
   EXPECT_EQ(found_direction(vec3(0, 1, 0), vec3(0), vec3(0)), dvec3(0, 1, 0));  // a light at the very place
 }
 
+// A heuristic: within 4 degrees of the least angle where that is less than 90, and 0.3 on average. Further away the
+// nearest point of the box stands in, which may be 60 degrees worse; lobes have nothing there.
 TEST(DirectionInBox, PointsIntoTheBoxAndNearlyNearestToR) {
-  double worst = 0, sum = 0;
-  int cases = 0;
+  constexpr double kDegrees = 180 / M_PI;
+  double worst = 0, worst_behind = 0;
+  RunningMean mean;
   Stream random(113);
-  for (const BoxCase& c : box_cases(4000)) {
-    const dvec3 lo(c.lo), hi(c.hi);
-    const dvec3 w = found_direction(c.r, c.lo, c.hi);
+  for (const BoxCase& c : box_cases(3000)) {
+    const dvec3 lo(c.lo), hi(c.hi), w = found_direction(c.r, c.lo, c.hi);
     ASSERT_NEAR(glm::length(w), 1, 1e-4);
     ASSERT_TRUE(meets_box(w, lo, hi, 1e-5));
     double best = -1;
-    for (int k = 0; k < 400; ++k) {  // corners, edges, faces, inside
+    for (int k = 0; k < 300; ++k) {  // corners, edges, faces, inside
       vec3 t(random.next());
-      for (int axis = 0; axis < 3; ++axis)
-        if (k < 8) t[axis] = static_cast<float>((k >> axis) & 1);
-        else if (((k >> (2 * axis)) & 2) == 2) t[axis] = static_cast<float>((k >> (2 * axis)) & 1);
+      for (int axis = 0; axis < 3; ++axis) {
+        const int code = k >> (2 * axis);
+        if (k < 64 || (code & 2) != 0) t[axis] = static_cast<float>(code & 1);
+      }
       best = std::max(best, glm::dot(glm::normalize(glm::mix(lo, hi, dvec3(t))), dvec3(c.r)));
     }
     const double angle = std::acos(std::min(1.0, glm::dot(glm::normalize(w), dvec3(c.r))));
-    const double excess = angle - std::acos(std::min(1.0, best));
-    worst = std::max(worst, excess);
-    sum += std::max(0.0, excess);
-    ++cases;
+    const double excess = std::max(0.0, angle - std::acos(std::min(1.0, best))) * kDegrees;
+    (best > 0 ? worst : worst_behind) = std::max(best > 0 ? worst : worst_behind, excess);
+    if (best > 0) mean.add(excess);
   }
-  RecordProperty("worst_excess_degrees", std::to_string(worst * 180 / M_PI));
-  RecordProperty("mean_excess_degrees", std::to_string(sum / cases * 180 / M_PI));
-  std::printf("excess over the least angle: worst %.2f, mean %.3f degrees\n", worst * 180 / M_PI, sum / cases * 180 / M_PI);
-  EXPECT_LT(sum / cases, 2 * M_PI / 180);
+  EXPECT_LT(worst, 4);
+  EXPECT_LT(mean.mean(), 0.3);
+  EXPECT_LT(worst_behind, 60);
 }
 
 // --- drawing from a substitute -----------------------------------------------------------------------------------
@@ -786,7 +791,8 @@ TEST(SubstituteWalk, SubstitutesHoldTheirLightsInTheirBox) {
       ++seen;
       for (std::uint32_t leaf = edge(result.node, 0); leaf <= edge(result.node, 1); ++leaf) {
         const vec3 p = walk.tree.leaf(leaf).position;
-        EXPECT_TRUE(glm::all(glm::greaterThanEqual(p, result.box.lo)) && glm::all(glm::lessThanEqual(p, result.box.hi)));
+        EXPECT_TRUE(glm::all(glm::greaterThanEqual(p, result.box.lo)));
+        EXPECT_TRUE(glm::all(glm::lessThanEqual(p, result.box.hi)));
       }
     }
   }
