@@ -82,6 +82,17 @@ inline Lanes<W> load_lanes(const float* from) {
   return lanes;
 }
 
+// The first `count` lanes from memory, the others 0; what lies behind them is not read. 0 <= count <= W.
+template <int W>
+inline Lanes<W> load_first_lanes(const float* from, int count) {
+#if defined(LUMI_AVX512_LANES)
+  if constexpr (W == 16) return (Lanes<W>)_mm512_maskz_loadu_ps(static_cast<__mmask16>((1u << count) - 1), from);
+#endif
+  Lanes<W> lanes{};
+  std::memcpy(&lanes, from, static_cast<std::size_t>(count) * sizeof(float));
+  return lanes;
+}
+
 template <int W>
 inline void store_lanes(Lanes<W> lanes, float* to) {
   std::memcpy(to, &lanes, sizeof lanes);
@@ -336,6 +347,11 @@ LUMI_LANE_OPERATOR(/)
 template <int W>
 LUMI_HD inline Lanes<W> load_lanes(const float* from) {
   return make_lanes<W>([&](int c) { return from[c]; });
+}
+
+template <int W>
+LUMI_HD inline Lanes<W> load_first_lanes(const float* from, int count) {
+  return make_lanes<W>([&](int c) { return c < count ? from[c] : 0.0f; });
 }
 
 template <int W>
