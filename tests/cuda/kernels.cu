@@ -22,6 +22,7 @@
 #include "methods/light_tree/light_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
 #include "methods/substitute_tree/substitute_build_kernel.h"
+#include "methods/substitute_tree/substitute_draw_kernel.h"
 #include "methods/substitute_tree/substitute_walk_kernel.h"
 #include "methods/vpl/vpl_kernel.h"
 #include "methods/vpl_sampling/gather_kernel.h"
