@@ -281,6 +281,55 @@ TEST(IndirectLighting, TracesSayWhatTheWalksDid) {
   }
 }
 
+// Surfaces are lit many at once; each must get what it would get alone, by scalar code.
+TEST(IndirectLightKernel, BatchesMatchSingleSamples) {
+  const VplRoom room(glossy_room());
+  std::vector<Surface> surfaces = room.surfaces(700, kEye);
+  for (std::size_t i = 0; i < surfaces.size(); i += 11) surfaces[i].instance = kNone;
+  const std::vector<std::uint32_t> pixels = numbered(surfaces.size());
+  const std::size_t n = surfaces.size();
+  for (const bool substitutes : {false, true}) {
+    IndirectLighting lighting = room.lighting(Selection::kRoot);
+    VplSampler& sampler = lighting.sampler;
+    sampler.walk.substitutes = substitutes;
+    std::vector<Ray> shadow(n);
+    std::vector<vec3> contribution(n);
+    const IndirectLightKernel kernel{sampler, lighting.rng, kDimIndirect, 1, CorrectionPart::kSubstitute,
+                                     surfaces, pixels, shadow, contribution, {}, {}};
+    for (int batch = 0; batch < indirect_batches(static_cast<int>(n)); ++batch) kernel(batch);
+    int lit = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Surface& s = surfaces[i];
+      const Rng rng{lighting.rng.seed, lighting.rng.frame, pixels[i]};
+      const vec4 u = rng.uniform4(kDimIndirect);
+      const float p = diffuse_walk_probability(sampler, s);
+      const bool diffuse = u.x < p;
+      SubstituteWalkPoints points;
+      points.set(0, s, vec3(u.y, u.z, u.w), !diffuse);
+      WalkResult walk;
+      diffuse ? walk_substitute_tree<false>(sampler.walk, points, 1, &walk)
+              : walk_substitute_tree<true>(sampler.walk, points, 1, &walk);
+      vec3 expected(0);
+      Ray ray;
+      if (walk.end != WalkEnd::kDead && s.instance != kNone) {
+        VplPoint light = vpl_of_walk(sampler, walk, rng.uniform4(kDimIndirect + 4));
+        light.intensity /= diffuse ? p : 1 - p;
+        expected = vpl_light(s, light, sampler.clamp, diffuse ? Lobes::kDiffuse : Lobes::kGloss);
+        ray = vpl_shadow_ray(s, light);
+      }
+      ASSERT_EQ(max_component(expected) > 0, shadow[i].tmax >= shadow[i].tmin) << i;
+      ASSERT_LE(glm::length(contribution[i] - expected), 1e-3f * glm::length(expected)) << i;
+      if (!(max_component(expected) > 0)) continue;
+      ++lit;
+      ASSERT_LE(glm::length(shadow[i].origin - ray.origin), 1e-4f) << i;
+      ASSERT_LE(glm::length(shadow[i].direction - ray.direction), 1e-4f) << i;
+      ASSERT_NEAR(shadow[i].tmin, ray.tmin, 1e-4f) << i;
+      ASSERT_EQ(shadow[i].tmax, 1.0f) << i;
+    }
+    EXPECT_GT(lit, 200);
+  }
+}
+
 // --- the clamp ---------------------------------------------------------------------------------------------------
 
 TEST(IndirectLighting, NoContributionExceedsTheClamp) {

@@ -1,4 +1,4 @@
-#include "base/lanes.h"
+#include "base/lane_math.h"
 
 #include <gtest/gtest.h>
 
@@ -148,6 +148,34 @@ TYPED_TEST(Lane, ReciprocalRootsHaveFourteenBits) {
     const Lanes<W> a = TestFixture::floats(first, 0.37f * first), root = reciprocal_sqrt<W>(a);
     for (int c = 0; c < W; ++c)
       EXPECT_NEAR(static_cast<double>(root[c]) * std::sqrt(static_cast<double>(a[c])), 1, 0x1p-14);
+  }
+}
+
+TYPED_TEST(Lane, LoadingTheFirstLeavesTheOthersZero) {
+  constexpr int W = TestFixture::kWidth;
+  for (int count = 0; count <= W; ++count) {
+    const std::vector<float> from(static_cast<std::size_t>(count), 2.5f);  // no more may be read
+    const Lanes<W> lanes = load_first_lanes<W>(from.data(), count);
+    for (int c = 0; c < W; ++c) EXPECT_EQ(lanes[c], c < count ? 2.5f : 0.0f);
+  }
+}
+
+TYPED_TEST(Lane, FunctionsAreThoseOfTheStandardLibrary) {
+  constexpr int W = TestFixture::kWidth;
+  for (int k = 0; k < 4000; ++k) {
+    const auto share = static_cast<float>(k) / 4000;
+    const Lanes<W> u = TestFixture::floats(share, 1e-5f);
+    const Lanes<W> a = TestFixture::floats(std::exp(60 * share - 30), 1e-7f);
+    Lanes<W> sine, cosine;
+    sine_cosine_of_turns<W>(u, sine, cosine);
+    const Lanes<W> log = log_lanes<W>(a), root = inverse_sqrt<W>(a);
+    for (int c = 0; c < W; ++c) {
+      const double turn = 2 * M_PI * static_cast<double>(u[c]), value = static_cast<double>(a[c]);
+      ASSERT_NEAR(sine[c], std::sin(turn), 4e-6) << u[c];
+      ASSERT_NEAR(cosine[c], std::cos(turn), 4e-6) << u[c];
+      ASSERT_NEAR(log[c], std::log(value), 1e-6 * std::max(1.0, std::abs(std::log(value)))) << a[c];
+      ASSERT_NEAR(static_cast<double>(root[c]) * std::sqrt(value), 1, 1e-6) << a[c];
+    }
   }
 }
 

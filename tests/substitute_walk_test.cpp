@@ -113,8 +113,8 @@ Ends enumerate_ends(const SubstituteWalk& walk, bool gloss, const SubstituteWalk
   return ends;
 }
 
-// In one place: inlined in several, products and sums of frames and mirror directions may be fused differently.
-[[gnu::noinline]] void set_point(SubstituteWalkPoints& points, int i, const Surface& surface, vec3 numbers) {
+// In one place: copied to several, products and sums of frames and mirror directions may be fused differently.
+[[gnu::noipa]] void set_point(SubstituteWalkPoints& points, int i, const Surface& surface, vec3 numbers) {
   points.set(i, surface, numbers, true);
 }
 
