@@ -73,7 +73,7 @@ TEST(LightTree, ProbabilitiesSumToOneOrToNothingOnADeadBranch) {
       for (const Surface& s : shading_points(60)) {
         double sum = 0;
         for (std::uint32_t e = 0; e < world.lights().emitters.size(); ++e)
-          sum += pdf_tree(world.tree().view(), s.position, s.normal, e);
+          sum += pdf_tree(world.tree().view(), whole_tree(world.tree().view()), s.position, s.normal, e);
         // A dead branch below a live one loses its share, so the sum may fall short, never exceed.
         EXPECT_LE(sum, 1 + 1e-4) << named.name << ", " << name_of(tree_options);
       }
@@ -90,7 +90,7 @@ TEST(LightTree, WalkReportsThePdfBitForBit) {
         const vec4 u = random.next();
         const TreeSample sample = sample_tree(world.tree().view(), s.position, s.normal, vec2(u.x, u.y));
         if (sample.emitter == kNoEmitter) continue;
-        EXPECT_EQ(sample.pdf, pdf_tree(world.tree().view(), s.position, s.normal, sample.emitter))
+        EXPECT_EQ(sample.pdf, pdf_tree(world.tree().view(), whole_tree(world.tree().view()), s.position, s.normal, sample.emitter))
             << named.name << ", " << name_of(tree_options);
       }
     }
@@ -114,7 +114,7 @@ TEST(LightTree, FrequenciesFollowThePdf) {
         }
         double total = 0;
         for (std::uint32_t e = 0; e < n; ++e)
-          total += expected[e] = kDraws * static_cast<double>(pdf_tree(tree, s.position, s.normal, e));
+          total += expected[e] = kDraws * static_cast<double>(pdf_tree(tree, whole_tree(tree), s.position, s.normal, e));
         expected[n] = kDraws - total;  // dead branches
         if (expected[n] < 1e-3 * kDraws && observed[n] == 0) expected[n] = 0;
         // 192 tests in all: 1e-5 each keeps false alarms below one in five hundred.
@@ -138,7 +138,7 @@ TEST(LightTree, ContributionImpliesProbability) {
           const EmitterPoint point =
               sample_emitter_point(sampler.scene, sampler.lights, e, s.position, vec2(u.x, u.y));
           if (!(max_component(point.incident) > 0) || !(glm::dot(point.wi, s.normal) > 1e-5f)) continue;
-          ASSERT_GT(pdf_tree(sampler.tree, s.position, s.normal, e), 0.0f) << named.name << ", emitter " << e;
+          ASSERT_GT(pdf_tree(sampler.tree, whole_tree(sampler.tree), s.position, s.normal, e), 0.0f) << named.name << ", emitter " << e;
         }
       }
     }
@@ -175,7 +175,7 @@ TEST(LightTree, CoincidentLightsShareEqually) {
   for (const LightTree::Options& tree_options : kTrees) {
     const LightWorld world(scene, tree_options);
     for (std::uint32_t e = 0; e < 37; ++e)
-      EXPECT_NEAR(pdf_tree(world.tree().view(), vec3(1, 0, 0), vec3(0, 1, 0), e), 1.0 / 37, 1e-5);
+      EXPECT_NEAR(pdf_tree(world.tree().view(), whole_tree(world.tree().view()), vec3(1, 0, 0), vec3(0, 1, 0), e), 1.0 / 37, 1e-5);
   }
 }
 
@@ -202,8 +202,8 @@ TEST(LightTree, ScalingTheSceneChangesNoProbability) {
   const LightWorld a(scene), b(scaled);
   for (const Surface& s : shading_points(100))
     for (std::uint32_t e = 0; e < a.lights().emitters.size(); ++e)
-      EXPECT_EQ(pdf_tree(a.tree().view(), s.position, s.normal, e),
-                pdf_tree(b.tree().view(), s.position * kScale, s.normal, e));
+      EXPECT_EQ(pdf_tree(a.tree().view(), whole_tree(a.tree().view()), s.position, s.normal, e),
+                pdf_tree(b.tree().view(), whole_tree(b.tree().view()), s.position * kScale, s.normal, e));
 }
 
 TEST(LightTree, AMillionLightsStayWithinTheirBytesAndAreReachable) {

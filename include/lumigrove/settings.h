@@ -17,7 +17,7 @@ namespace lumigrove {
 // The axes of the space of methods (docs/papers.md); the table in registry.cpp holds their names.
 enum class Hierarchy : std::uint8_t { kNone, kPerfect };
 enum class Weights : std::uint8_t { kMinMax };
-enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll };
+enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut };
 enum class Transport : std::uint8_t { kNone, kPath, kVpl };
 enum class IndirectHierarchy : std::uint8_t { kNone, kSubstitute };
 enum class Topology : std::uint8_t { kRadix, kPerfect };
@@ -33,6 +33,11 @@ struct DirectSettings {
   bool cones = true;            // weights bound the emitters' own cosine (the paper's do not)
   int spp = 1;                  // light samples for each camera sample
   bool mis = false;             // combine with BSDF sampling (balance heuristic)
+  // Cuts (kCut): spp is the number of a cut's nodes, at most 32, each sampled once
+  int cut_share = 8;            // k: blocks of k x k pixels share a cut; 1 = a cut for every pixel
+  int cut_interleave = 1;       // m: the pixels of m x m share out a cut's nodes
+  float cut_floor = 0.001f;     // least distance in the bound, in units of the diagonal of the lights' box
+  bool cut_exact = false;       // cosine bounds are bounds, not the nearest point's
 };
 
 // Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D.

@@ -34,6 +34,7 @@ enum Dimension : std::uint32_t {
   kDimVpl = 1u << 28,       // tracing of virtual point lights: emission first, then 4 for every bounce
   kDimIndirect = 2u << 28,  // sampling of virtual point lights: 12 for each sample
   kDimGather = 3u << 28,    // one more ray from a surface, and the light where it arrives
+  kDimCut = 4u << 28,       // 1: pixel that a block's cut is chosen for
 };
 
 // Random numbers of one pixel of one frame. `dimension` counts single floats; blocks of four share one hash.

@@ -67,7 +67,8 @@ PathTracing make_path_tracing(const Settings& settings, const DirectLighting& di
   PathTracing tracing;
   tracing.lighting = direct;
   tracing.first_spp = direct.spp;
-  tracing.lighting.spp = 1;  // direct.spp is for what the camera sees
+  tracing.lighting.spp = 1;  // direct.spp is for what the camera sees, and so are cuts
+  tracing.lighting.use_cuts = false;
   tracing.max_bounces = settings.indirect.transport == Transport::kPath ? settings.indirect.max_bounces : 0;
   tracing.roulette_start = settings.indirect.roulette_start;
   tracing.light_scale = settings.light_scale;
@@ -80,6 +81,7 @@ Gather make_gather(const Settings& settings, const DirectLighting& direct, const
   Gather gather{direct, indirect, settings.indirect.compensate, settings.force_diffuse};
   gather.direct.spp = 1;
   gather.direct.mis = false;
+  gather.direct.use_cuts = false;
   return gather;
 }
 
@@ -110,7 +112,9 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
     launch(count, EmissionKernel{scene, lights, settings.light_scale, b.rays, b.surfaces, b.emission});
   });
 
-  add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
+  DirectLighting of_tile = direct;
+  of_tile.lookup.window = tile;
+  add_direct_light(of_tile, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, direct), b.surfaces, b.pixels, b.path_buffers, b.direct,
                  b.indirect);
   if (settings.indirect.transport == Transport::kVpl) {
@@ -204,7 +208,7 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   stats.emitters = lights.emitters.size();
   stats.structures.push_back(
       {"light set", world.lights.gather_ms(), world.lights.bytes(), lights.emitters.size()});
-  if (settings.direct.selection == Selection::kRoot) {
+  if (settings.direct.selection == Selection::kRoot || settings.direct.selection == Selection::kCut) {
     world.tree.build(lights, {settings.direct.width, settings.direct.cones, settings.direct.mis});
     stats.structures.push_back(
         {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
@@ -298,6 +302,17 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
     case Selection::kRoot:
       direct.sampler.choice = LightChoice::kTree;
       break;
+    case Selection::kCut: {
+      direct.sampler.choice = LightChoice::kTree;
+      direct.use_cuts = true;
+      const float floor = settings.direct.cut_floor * direct.sampler.lights.bounds.diagonal();
+      direct.cut = {settings.direct.spp, std::max(floor * floor, direct.sampler.tree.inside2),
+                    settings.direct.cut_exact};
+      direct.lookup.share = settings.direct.cut_share;
+      direct.lookup.interleave = settings.direct.cut_interleave;
+      direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
+      break;
+    }
     case Selection::kAll:
       direct.all = true;
       break;
@@ -337,6 +352,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     sum.surface_ms += b.surface_ms;
     sum.film_ms += b.film_ms;
     sum.primary_rays += b.primary_rays;
+    sum.direct_buffers.cut_ms += b.direct_buffers.cut_ms;
     sum.direct_buffers.select_ms += b.direct_buffers.select_ms;
     sum.direct_buffers.trace_ms += b.direct_buffers.trace_ms;
     sum.direct_buffers.rays += b.direct_buffers.rays;
@@ -347,6 +363,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "camera rays", sum.camera_ms, 0);
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
   add_pass(stats, "surfaces", sum.surface_ms, 0);
+  if (direct.use_cuts) add_pass(stats, "cuts", sum.direct_buffers.cut_ms, 0);
   add_pass(stats, "light selection", sum.direct_buffers.select_ms, 0);
   add_pass(stats, "shadow rays", sum.direct_buffers.trace_ms, sum.direct_buffers.rays);
   if (settings.direct.mis || settings.indirect.transport == Transport::kPath) {

@@ -10,6 +10,7 @@
 #include "base/nearest.h"
 #include "frame/value_text.h"
 #include "lumigrove/settings.h"
+#include "methods/lightcuts/cut_kernel.h"
 
 namespace lumigrove {
 namespace {
@@ -217,9 +218,10 @@ std::vector<Setting> direct_rows() {
           vector<pair<string, Selection>>{{"uniform", Selection::kUniform},
                                           {"power", Selection::kPower},
                                           {"root", Selection::kRoot},
-                                          {"all", Selection::kAll}},
-          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, or all of "
-          "them"),
+                                          {"all", Selection::kAll},
+                                          {"cut", Selection::kCut}},
+          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, or walking it "
+          "from every node of a cut"),
       choice(
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
           vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone}, {"perfect", Hierarchy::kPerfect}},
@@ -241,6 +243,18 @@ std::vector<Setting> direct_rows() {
       flag(
           "direct.mis", [](auto& s) -> auto& { return s.direct.mis; },
           "Combine light samples with BSDF samples (balance heuristic)"),
+      integer(
+          "direct.cut_share", [](auto& s) -> auto& { return s.direct.cut_share; }, {1, 64}, "pixels",
+          "Edge of the blocks of pixels that share a cut; direct.spp is the number of the cut's nodes"),
+      integer(
+          "direct.cut_interleave", [](auto& s) -> auto& { return s.direct.cut_interleave; }, {1, 8}, "pixels",
+          "Edge of the blocks of pixels that share out a cut's nodes among them; 1 = every pixel samples all"),
+      real(
+          "direct.cut_floor", [](auto& s) -> auto& { return s.direct.cut_floor; }, {0, 1, true}, "R",
+          "Least distance in the error bound of cuts; R = diagonal of the lights' box"),
+      flag(
+          "direct.cut_exact", [](auto& s) -> auto& { return s.direct.cut_exact; },
+          "The error bound of cuts bounds the cosine exactly; otherwise by the box's nearest point"),
   };
 }
 
@@ -392,6 +406,15 @@ void check_view(const ViewSettings& view) {
   if (!(sine > kLeastSine)) throw Error("view.up is parallel to the viewing direction");
 }
 
+void check_cuts(const DirectSettings& s) {
+  if (s.selection != Selection::kCut) return;
+  if (s.hierarchy == Hierarchy::kNone)
+    throw Error("direct.selection 'cut' cuts a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
+  if (s.spp > kMaxCut)
+    throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
+  if (s.mis) throw Error("direct.mis does not combine with cuts; set direct.selection 'root' or direct.mis false");
+}
+
 void check_vpls(const IndirectSettings& s) {
   if (s.transport != Transport::kVpl) return;
   if (s.selection == Selection::kRoot && s.hierarchy == IndirectHierarchy::kNone)
@@ -413,6 +436,16 @@ const std::vector<PresetInfo>& presets() {
        {{"direct.selection", "root"},
         {"direct.hierarchy", "perfect"},
         {"direct.weights", "min-max"},
+        {"indirect.transport", "none"}}},
+      {"rtslc",
+       "Real-time stochastic lightcuts: a cut of the perfect light tree for every 8x8 pixels, a sample below each of its 8 "
+       "nodes; direct light only",
+       "D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts. Proc. ACM Comput. Graph. Interact. Tech. 3(1), 2020",
+       {{"direct.selection", "cut"},
+        {"direct.hierarchy", "perfect"},
+        {"direct.weights", "min-max"},
+        {"direct.spp", "8"},
+        {"direct.cut_share", "8"},
         {"indirect.transport", "none"}}},
       {"power",
        "Emitters by flux, from an alias table; direct light only",
@@ -504,6 +537,7 @@ void check(const Settings& s) {
   if (s.view) check_view(*s.view);
   if (s.direct.selection == Selection::kRoot && s.direct.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'root' walks a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
+  check_cuts(s.direct);
   check_vpls(s.indirect);
 }
 

@@ -19,27 +19,56 @@ struct PixelWindow {
   LUMI_HD int count() const { return width() * height(); }
 };
 
-// Neighbours in a launch are neighbours in the image, so that a packet of 16 rays covers a square.
-inline constexpr int kPixelBlock = 4;
+// Neighbours in a launch are neighbours in the image: packets of 16 rays cover a square, and the 64 surfaces that are lit
+// together a square of such squares.
+inline constexpr int kPixelBlock = 4, kPixelSuperblock = 8;
 
 struct Pixel {
   int x, y;
 };
 
-// Launch index -> pixel: bands of kPixelBlock rows, each cut into blocks of kPixelBlock columns (the last
-// band and the last block of a band may be smaller), pixels row by row inside a block. Every pixel of the
+// One level of the order: bands of kSize rows, each cut into blocks of kSize columns (the last band and the last block of a
+// band may be smaller).
+template <int kSize>
+struct BlockOrder {
+  PixelWindow window;
+
+  struct Place {
+    PixelWindow block;
+    int in_block;
+  };
+  LUMI_HD Place block_of_index(int index) const {
+    const int band_size = kSize * window.width();
+    const int band = index / band_size, in_band = index - band * band_size;
+    const int rows = glm::min(kSize, window.height() - band * kSize);
+    // Dividing by the constant, which is a shift, in the whole blocks that make up nearly all of an image.
+    const int block = rows == kSize ? in_band / (kSize * kSize) : in_band / (kSize * rows);
+    const int x = window.x0 + block * kSize, y = window.y0 + band * kSize;
+    return {{x, y, glm::min(x + kSize, window.x1), y + rows}, in_band - block * kSize * rows};
+  }
+  LUMI_HD Place block_of_pixel(Pixel pixel) const {  // in_block: index of the block's first pixel
+    const int band = (pixel.y - window.y0) / kSize, block = (pixel.x - window.x0) / kSize;
+    const int x = window.x0 + block * kSize, y = window.y0 + band * kSize;
+    const int y1 = glm::min(y + kSize, window.y1);
+    return {{x, y, glm::min(x + kSize, window.x1), y1}, band * kSize * window.width() + block * kSize * (y1 - y)};
+  }
+};
+
+// Launch index -> pixel: blocks of kPixelSuperblock, in each blocks of kPixelBlock, in each row by row. Every pixel of the
 // window comes once.
 LUMI_HD inline Pixel pixel_of_index(const PixelWindow& window, int index) {
-  const int band_size = kPixelBlock * window.width();
-  const int band = index / band_size, in_band = index - band * band_size;
-  const int rows = glm::min(kPixelBlock, window.height() - band * kPixelBlock);
-  // Dividing by the constant, which is a shift, in the whole blocks that make up nearly all of an image.
-  const int block =
-      rows == kPixelBlock ? in_band / (kPixelBlock * kPixelBlock) : in_band / (kPixelBlock * rows);
-  const int in_block = in_band - block * kPixelBlock * rows;
-  const int columns = glm::min(kPixelBlock, window.width() - block * kPixelBlock);
-  const int row = columns == kPixelBlock ? in_block / kPixelBlock : in_block / columns;
-  return {window.x0 + block * kPixelBlock + in_block - row * columns, window.y0 + band * kPixelBlock + row};
+  const auto outer = BlockOrder<kPixelSuperblock>{window}.block_of_index(index);
+  const auto inner = BlockOrder<kPixelBlock>{outer.block}.block_of_index(outer.in_block);
+  const int columns = inner.block.width();
+  const int row = columns == kPixelBlock ? inner.in_block / kPixelBlock : inner.in_block / columns;
+  return {inner.block.x0 + inner.in_block - row * columns, inner.block.y0 + row};
+}
+
+// Its inverse.
+LUMI_HD inline int index_of_pixel(const PixelWindow& window, Pixel pixel) {
+  const auto outer = BlockOrder<kPixelSuperblock>{window}.block_of_pixel(pixel);
+  const auto inner = BlockOrder<kPixelBlock>{outer.block}.block_of_pixel(pixel);
+  return outer.in_block + inner.in_block + (pixel.y - inner.block.y0) * inner.block.width() + pixel.x - inner.block.x0;
 }
 
 // A camera for an image of `width` x `height` pixels. A point of the image plane at distance 1 is

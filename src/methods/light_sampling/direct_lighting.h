@@ -7,6 +7,7 @@
 
 #include "base/rng.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/lightcuts/cut_kernel.h"
 #include "scene/surface.h"
 #include "trace/trace.h"
 
@@ -20,6 +21,11 @@ struct DirectLighting {
   int spp = 1;       // light samples a surface, averaged
   bool all = false;  // instead: spp samples of every light, summed (the oracle)
   bool mis = false;  // weigh samples for use beside BSDF sampling (balance heuristic)
+  // Cuts, where `use_cuts`: a sample below each node of a cut instead of `spp` samples of the whole tree. Only for all
+  // surfaces of a tile, in the order of pixel_of_index.
+  bool use_cuts = false;
+  CutOptions cut;
+  CutLookup lookup;
 };
 
 // Working memory, reused from batch to batch. `rays` counts the shadow rays traced.
@@ -27,8 +33,9 @@ struct DirectBuffers {
   std::vector<Ray> shadow;
   std::vector<vec3> contribution;
   std::vector<std::uint8_t> occluded;
+  std::vector<LightCut> cuts;
   std::uint64_t rays = 0;
-  double select_ms = 0, trace_ms = 0;
+  double cut_ms = 0, select_ms = 0, trace_ms = 0;
 };
 
 // sum[i] += light reaching surfaces[i] from the chosen lights and leaving it towards wo (radiance).

@@ -6,9 +6,18 @@
 
 #include "base/rng.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/lightcuts/cut_kernel.h"
 #include "scene/bsdf.h"
 
 namespace lumigrove {
+
+// The cuts of a tile, and which of a pixel's nodes is sampled.
+struct CutSamples {
+  std::span<const LightCut> cuts;  // by block
+  CutLookup lookup;
+  int pass = 0;
+  float scale = 1;  // m^2: interleaved pixels sample only their share of the nodes
+};
 
 // surfaces[i] -> shadow[i], contribution[i] (radiance towards wo if unoccluded). Rays that carry nothing are
 // marked untraced. Surfaces take their random numbers from `dimension`. One call does kWalkBatch surfaces, so that
@@ -23,6 +32,7 @@ struct DirectLightKernel {
   std::span<const std::uint32_t> pixels;
   std::span<Ray> shadow;
   std::span<vec3> contribution;
+  CutSamples cuts;  // none: walks start at the root
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
@@ -33,7 +43,7 @@ struct DirectLightKernel {
     }
     for (int k = 0; k < count; ++k) {
       const std::size_t i = first + static_cast<std::size_t>(k);
-      if (lights_up(i)) write(i, sample_light(sampler, surfaces[i], random_numbers(i)));
+      if (lights_up(i)) write(i, sample_light(sampler, surfaces[i], random_numbers(i)), scale);
     }
   }
 
@@ -49,12 +59,21 @@ struct DirectLightKernel {
     return surfaces[i].instance != kNone;
   }
 
+  // Where the walk of a surface starts; without children where this pass has no node for its pixel.
+  LUMI_HD Subtree start_of(std::size_t i) const {
+    if (cuts.cuts.empty()) return whole_tree(sampler.tree);
+    const Pixel pixel = pixel_of_index(cuts.lookup.window, static_cast<int>(i));
+    const LightCut& cut = cuts.cuts[static_cast<std::size_t>(cuts.lookup.block_of(pixel))];
+    const CutEntries entries = entries_of_pixel(cuts.lookup, pixel, cut.count);
+    const int entry = entries.first + cuts.pass;
+    return entry < entries.end ? cut.nodes[entry] : Subtree{};
+  }
+
   LUMI_HD void light_by_walks(std::size_t first, int count) const {
-    WalkPoints points;
     ChosenGroup groups[kWalkBatch];
-    vec2 u_point[kWalkBatch];
-    std::size_t index[kWalkBatch];
-    TreeSample chosen[kWalkBatch];
+    vec4 numbers[kWalkBatch];
+    Subtree starts[kWalkBatch];
+    std::uint32_t index[kWalkBatch];
     int walks = 0;
     for (int k = 0; k < count; ++k) {
       const std::size_t i = first + static_cast<std::size_t>(k);
@@ -63,15 +82,17 @@ struct DirectLightKernel {
       const vec4 u = random_numbers(i);
       const ChosenGroup group = choose_group(sampler, surface, u.x);
       if (group.group != LightGroup::kLocal) {
-        write(i, light_in_group(sampler, surface, group, {}, vec2(u.y, u.z)));
+        write(i, light_in_group(sampler, surface, group, {}, vec2(u.y, u.z)), scale);
         continue;
       }
-      points.set(walks, surface.position, surface.normal, vec2(group.r, u.w));
+      starts[walks] = start_of(i);
+      if (starts[walks].children == 0) continue;
       groups[walks] = group;
-      u_point[walks] = vec2(u.y, u.z);
-      index[walks++] = i;
+      numbers[walks] = u;
+      index[walks++] = static_cast<std::uint32_t>(i);
     }
-    sample_trees(sampler.tree, whole_tree(sampler.tree), points, walks, chosen);
+    TreeSample chosen[kWalkBatch];
+    walk_from_starts(starts, index, groups, numbers, walks, chosen);
     for (int k = 0; k < walks; ++k) {
       if (!(chosen[k].pdf > 0)) continue;
       const Emitter* emitter = &sampler.lights.emitters[chosen[k].emitter];
@@ -79,15 +100,39 @@ struct DirectLightKernel {
       prefetch(&emitter->source);
     }
     for (int k = 0; k < walks; ++k)
-      write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], u_point[k]));
+      write(index[k],
+            light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], vec2(numbers[k].y, numbers[k].z)),
+            cuts.cuts.empty() ? scale : cuts.scale);
   }
 
-  LUMI_HD LUMI_ALWAYS_INLINE void write(std::size_t i, const LightSample& sample) const {
+  // Walks that start at one place go together: all of them without cuts, and those of a block that shares one.
+  LUMI_HD void walk_from_starts(const Subtree* starts, const std::uint32_t* index, const ChosenGroup* groups,
+                                const vec4* numbers, int count, TreeSample* chosen) const {
+    bool done[kWalkBatch] = {};
+    for (int leader = 0; leader < count; ++leader) {
+      if (done[leader]) continue;
+      WalkPoints points;
+      int members[kWalkBatch];
+      int size = 0;
+      for (int k = leader; k < count; ++k) {
+        if (done[k] || !(starts[k] == starts[leader])) continue;
+        done[k] = true;
+        const Surface& surface = surfaces[index[k]];
+        points.set(size, surface.position, surface.normal, vec2(groups[k].r, numbers[k].w));
+        members[size++] = k;
+      }
+      TreeSample samples[kWalkBatch];
+      sample_trees(sampler.tree, starts[leader], points, size, samples);
+      for (int k = 0; k < size; ++k) chosen[members[k]] = samples[k];
+    }
+  }
+
+  LUMI_HD LUMI_ALWAYS_INLINE void write(std::size_t i, const LightSample& sample, float weight) const {
     if (!(max_component(sample.weight) > 0)) return;
     const Surface& surface = surfaces[i];
     const float cosine = glm::dot(surface.normal, sample.wi);
     if (!(cosine > 0)) return;
-    vec3 light = bsdf_eval(surface, sample.wi) * sample.weight * (cosine * scale);
+    vec3 light = bsdf_eval(surface, sample.wi) * sample.weight * (cosine * weight);
     // Balance heuristic of n = 1 / scale light samples and one BSDF sample.
     if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + scale * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;

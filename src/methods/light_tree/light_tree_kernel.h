@@ -79,6 +79,10 @@ struct Subtree {
   std::uint32_t node = 0;  // of its level
   std::int16_t level = 0;
   std::uint8_t first = 0, children = 0;
+
+  LUMI_HD bool operator==(const Subtree& o) const {
+    return node == o.node && level == o.level && first == o.first && children == o.children;
+  }
 };
 
 LUMI_HD inline Subtree whole_tree(const LightTreeView& tree) {
