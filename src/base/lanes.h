@@ -47,6 +47,15 @@ LUMI_HD LUMI_ALWAYS_INLINE void forget_registers() {
 #endif
 }
 
+// The same for a line that will be written soon.
+LUMI_HD LUMI_ALWAYS_INLINE void prefetch_to_write(const void* address) {
+#if LUMI_VECTOR_LANES
+  __builtin_prefetch(address, 1);
+#else
+  (void)address;
+#endif
+}
+
 #if LUMI_VECTOR_LANES
 
 // W: 2, 4, 8 or 16. Arithmetic and comparisons are the compiler's.

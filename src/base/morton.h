@@ -3,14 +3,22 @@
 
 #include "base/vec.h"
 
+#if defined(__BMI2__) && !defined(__CUDACC__)
+#include <immintrin.h>
+#endif
+
 namespace lumigrove {
 
 // Spreads the low 10 bits of v to every third bit.
 LUMI_HD inline std::uint32_t spread_bits_by_3(std::uint32_t v) {
+#if defined(__BMI2__) && !defined(__CUDACC__)
+  return _pdep_u32(v, 0x09249249u);
+#else
   v = (v | (v << 16)) & 0x030000ffu;
   v = (v | (v << 8)) & 0x0300f00fu;
   v = (v | (v << 4)) & 0x030c30c3u;
   return (v | (v << 2)) & 0x09249249u;
+#endif
 }
 
 // `p` in units of the box it is quantised over, [0,1]^3; values outside (and NaN) are clamped.

@@ -32,7 +32,8 @@ enum Dimension : std::uint32_t {
   kDimBsdf = 2048,  // lobe (1), direction (2), roulette (1)
   kDimensionsPerVertex = 4096,
   kDimVpl = 1u << 28,       // tracing of virtual point lights: emission first, then 4 for every bounce
-  kDimIndirect = 1u << 29,  // sampling of virtual point lights: 12 for each sample
+  kDimIndirect = 2u << 28,  // sampling of virtual point lights: 12 for each sample
+  kDimGather = 3u << 28,    // one more ray from a surface, and the light where it arrives
 };
 
 // Random numbers of one pixel of one frame. `dimension` counts single floats; blocks of four share one hash.

@@ -38,6 +38,16 @@ Layer id_layer(const Film& film, const char* name, const Get& get) {
   return layer;
 }
 
+Layer walk_layer(const Film& film) {
+  Layer layer;
+  layer.name = "walk";
+  layer.channels = {"steps", "size", "substitute", "boxed", "clamped"};
+  layer.values.reserve(film.walks.size() * layer.channels.size());
+  for (const WalkPixel& p : film.walks)
+    layer.values.insert(layer.values.end(), {p.steps, p.size, p.substitute, p.boxed, p.clamped});
+  return layer;
+}
+
 FilmPixel black_pixel() {
   FilmPixel pixel{};
   pixel.depth = kInfinity;
@@ -47,10 +57,11 @@ FilmPixel black_pixel() {
 
 }  // namespace
 
-Film::Film(int film_width, int film_height)
+Film::Film(int film_width, int film_height, bool shows_walks)
     : width(film_width),
       height(film_height),
-      pixels(static_cast<std::size_t>(film_width) * static_cast<std::size_t>(film_height), black_pixel()) {}
+      pixels(static_cast<std::size_t>(film_width) * static_cast<std::size_t>(film_height), black_pixel()),
+      walks(shows_walks ? pixels.size() : 0, WalkPixel{}) {}
 
 Image develop(const Film& film, int samples) {
   using P = const FilmPixel&;
@@ -72,6 +83,7 @@ Image develop(const Film& film, int samples) {
     image.layers.push_back(
         float_layer(film, "variance", rgb, [scale](P p) { return vec4(p.moment2 * scale, 0); }));
   }
+  if (!film.walks.empty()) image.layers.push_back(walk_layer(film));
   image.layers.push_back(id_layer(film, "emitter", [](P p) { return p.emitter; }));
   image.layers.push_back(id_layer(film, "instance", [](P p) { return p.instance; }));
   return image;

@@ -6,6 +6,7 @@
 
 #include "lights/emitter.h"
 #include "lumigrove/image.h"
+#include "methods/vpl_sampling/indirect_lighting_kernel.h"
 #include "scene/surface.h"
 #include "trace/ray.h"
 
@@ -64,11 +65,37 @@ struct FilmKernel {
   }
 };
 
+// What the walks for a pixel did, means over its samples (indirect.show).
+struct WalkPixel {
+  float steps, size, substitute, boxed, clamped;
+};
+
+struct WalkFilmKernel {
+  int sample;
+  std::span<const VplTrace> traces;
+  std::span<const std::uint32_t> pixels;
+  std::span<WalkPixel> film;
+
+  LUMI_HD void operator()(int index) const {
+    const std::size_t i = static_cast<std::size_t>(index);
+    const VplTrace& trace = traces[i];
+    WalkPixel& pixel = film[pixels[i]];
+    const float weight = 1 / static_cast<float>(sample + 1);
+    const auto add = [&](float& mean, float value) { mean += (value - mean) * weight; };
+    add(pixel.steps, trace.steps);
+    add(pixel.size, trace.size);
+    add(pixel.substitute, trace.substitute ? 1.0f : 0.0f);
+    add(pixel.boxed, trace.boxed ? 1.0f : 0.0f);
+    add(pixel.clamped, trace.clamped ? 1.0f : 0.0f);
+  }
+};
+
 struct Film {
   int width = 0, height = 0;
   std::vector<FilmPixel> pixels;  // row by row from the top; outside the crop window all zero
+  std::vector<WalkPixel> walks;   // empty unless they are shown
 
-  Film(int film_width, int film_height);
+  Film(int film_width, int film_height, bool shows_walks = false);
 };
 
 // All layers; `samples` is how many went into every pixel. Variance needs two.

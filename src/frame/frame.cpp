@@ -15,6 +15,7 @@
 #include "frame/camera.h"
 #include "frame/emission_kernel.h"
 #include "methods/reference/path.h"
+#include "methods/vpl_sampling/gather.h"
 #include "scene/surface_kernel.h"
 
 namespace lumigrove {
@@ -34,6 +35,7 @@ struct TileBuffers {
   DirectBuffers direct_buffers;
   PathBuffers path_buffers;
   IndirectBuffers indirect_buffers;
+  GatherBuffers gather_buffers;
   double camera_ms = 0, primary_ms = 0, surface_ms = 0, film_ms = 0;
   std::uint64_t primary_rays = 0;
 };
@@ -73,6 +75,14 @@ PathTracing make_path_tracing(const Settings& settings, const DirectLighting& di
   return tracing;
 }
 
+// One more ray from mirrors and near corners, lit where it arrives as the surfaces themselves are.
+Gather make_gather(const Settings& settings, const DirectLighting& direct, const IndirectLighting& indirect) {
+  Gather gather{direct, indirect, settings.indirect.compensate, settings.force_diffuse};
+  gather.direct.spp = 1;
+  gather.direct.mis = false;
+  return gather;
+}
+
 // G-buffer · direct light · indirect light · film, for the pixels of one tile.
 void light_tile(const World& world, const Settings& settings, const DirectLighting& direct,
                 const IndirectLighting& indirect, const CameraView& camera, const PixelWindow& tile, int sample, TileBuffers& b, Film& film) {
@@ -103,8 +113,13 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
   add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, direct), b.surfaces, b.pixels, b.path_buffers, b.direct,
                  b.indirect);
-  if (settings.indirect.transport == Transport::kVpl)
+  if (settings.indirect.transport == Transport::kVpl) {
+    b.indirect_buffers.wants_traces = !film.walks.empty();
     add_indirect_light(indirect, b.surfaces, b.pixels, kDimIndirect, b.indirect_buffers, b.indirect);
+    add_gathered_light(make_gather(settings, direct, indirect), b.surfaces, b.pixels, b.gather_buffers, b.indirect);
+    if (!film.walks.empty())
+      launch(count, WalkFilmKernel{sample, b.indirect_buffers.traces, b.pixels, film.walks});
+  }
 
   timed(b.film_ms, [&] {
     launch(count, FilmKernel{sample,
@@ -148,6 +163,14 @@ void add_pass_ms(RenderStats& stats, const char* name, double ms, std::uint64_t 
 // Adds what each thread measured, as wall time: the threads' sum over their number.
 void add_pass(RenderStats& stats, const char* name, double thread_ms, std::uint64_t rays) {
   add_pass_ms(stats, name, thread_ms / tbb::this_task_arena::max_concurrency(), rays);
+}
+
+void add_gather_passes(RenderStats& stats, const GatherBuffers& gather) {
+  add_pass(stats, "gather rays", gather.trace_ms, gather.rays_traced);
+  add_pass(stats, "gather surfaces", gather.surface_ms, 0);
+  add_pass(stats, "gather selection", gather.direct.select_ms + gather.indirect.select_ms, 0);
+  add_pass(stats, "gather shadow rays", gather.direct.trace_ms + gather.indirect.trace_ms,
+           gather.direct.rays + gather.indirect.rays);
 }
 
 // Shadow rays leave a substitute through this much of its surroundings, in units of D: it may lie inside geometry.
@@ -248,6 +271,7 @@ IndirectLighting make_indirect_lighting(const World& world, const Settings& sett
   sampler.substitute_offset = kSubstituteOffset * d;
   sampler.correction = s.correction;
   sampler.gloss = s.gloss;
+  sampler.mirror_roughness = s.mirror_roughness;
   indirect.all = s.selection == Selection::kAll;
   indirect.tracer = &world.tracer;
   indirect.rng = frame_rng(settings, sample);
@@ -315,6 +339,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     sum.direct_buffers.rays += b.direct_buffers.rays;
     sum.path_buffers.add_counters(b.path_buffers);
     sum.indirect_buffers.add_counters(b.indirect_buffers);
+    sum.gather_buffers.add_counters(b.gather_buffers);
   }
   add_pass(stats, "camera rays", sum.camera_ms, 0);
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
@@ -331,6 +356,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   if (settings.indirect.transport == Transport::kVpl) {
     add_pass(stats, "VPL selection", sum.indirect_buffers.select_ms, 0);
     add_pass(stats, "VPL shadow rays", sum.indirect_buffers.trace_ms, sum.indirect_buffers.rays);
+    if (sum.gather_buffers.rays_traced > 0) add_gather_passes(stats, sum.gather_buffers);
   }
   add_pass(stats, "film", sum.film_ms, 0);
 }
@@ -348,7 +374,8 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
   return arena.execute([&] {
     const Stopwatch watch;
     const std::unique_ptr<World> world = make_world(scene, settings, result);
-    Film film(settings.width, settings.height);
+    Film film(settings.width, settings.height,
+              settings.indirect.show && settings.indirect.transport == Transport::kVpl);
     for (int sample = 0; sample < settings.spp; ++sample) {
       trace_vpls(*world, settings, sample, result);
       render_sample(*world, settings, sample, film, result);

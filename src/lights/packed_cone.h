@@ -51,7 +51,8 @@ LUMI_HD inline PackedCone unite(PackedCone a, PackedCone b) {
   PackedCone both = pack_axis(length > 0.5f ? sum / length : vec3(0));
   const vec3 c(both.x, both.y, both.z);
   const float radius = glm::max(ra + glm::length(p - c) * kUnit, rb + glm::length(q - c) * kUnit);
-  both.radius = static_cast<std::uint8_t>(glm::min(glm::ceil(radius + 1e-3f), kConeRadius));
+  if (!(radius + 1e-3f < kConeRadius)) return {};
+  both.radius = static_cast<std::uint8_t>(glm::ceil(radius + 1e-3f));
   return both;
 }
 

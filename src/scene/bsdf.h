@@ -121,6 +121,32 @@ struct BsdfSample {
   float pdf = 0;  // 1/sr, of both lobes together; 0: nothing sampled
 };
 
+// From the gloss lobe alone; `weight` and `pdf` are this lobe's. Nothing where the surface has none.
+LUMI_HD inline BsdfSample bsdf_sample_gloss(const Surface& s, vec2 u) {
+  BsdfSample sample;
+  if (!has_gloss(s)) return sample;
+  const Frame frame = make_frame(s.normal);
+  const float alpha = s.roughness * s.roughness, a2 = alpha * alpha;
+  const vec3 half = frame.to_world(sample_visible_ggx_normal(frame.to_local(s.wo), alpha, u));
+  sample.wi = glm::normalize(2 * glm::dot(s.wo, half) * half - s.wo);
+  if (!above_surface(s, sample.wi)) return sample;
+  const float cos_v = glm::dot(s.normal, s.wo);
+  sample.pdf = 0.25f * smith_masking(cos_v, a2) * ggx_normal_density(s.normal, sample.wi + s.wo, a2) / cos_v;
+  if (sample.pdf > 0)
+    sample.weight = gloss_above_surface(s, sample.wi) * (glm::dot(s.normal, sample.wi) / sample.pdf);
+  return sample;
+}
+
+// From the diffuse lobe alone.
+LUMI_HD inline BsdfSample bsdf_sample_diffuse(const Surface& s, vec2 u) {
+  BsdfSample sample;
+  sample.wi = make_frame(s.normal).to_world(sample_cosine_hemisphere(u));
+  if (!above_surface(s, sample.wi)) return sample;
+  sample.pdf = pdf_cosine_hemisphere(glm::dot(s.normal, sample.wi));
+  sample.weight = s.diffuse;
+  return sample;
+}
+
 // u: lobe, direction, direction; uniform in [0,1).
 LUMI_HD inline BsdfSample bsdf_sample(const Surface& s, vec3 u) {
   const Frame frame = make_frame(s.normal);

@@ -1,11 +1,12 @@
 // Texture lookup: wrap modes, KHR_texture_transform, nearest or bilinear; no mip levels (a sample is a point).
 #pragma once
 
+#include "base/lanes.h"
 #include "scene/scene_view.h"
 
 namespace lumigrove {
 
-LUMI_HD inline vec4 fetch_texel(const ImageView& image, const float* srgb_to_linear, int x, int y) {
+LUMI_HD LUMI_ALWAYS_INLINE vec4 fetch_texel(const ImageView& image, const float* srgb_to_linear, int x, int y) {
   const std::size_t at = 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
                               static_cast<std::size_t>(x));
   if (image.texels32) {
@@ -20,6 +21,7 @@ LUMI_HD inline vec4 fetch_texel(const ImageView& image, const float* srgb_to_lin
 }
 
 LUMI_HD inline int wrap_texel(int i, int n, Wrap wrap) {
+  if (i >= 0 && i < n) return i;
   if (wrap == Wrap::kClamp) return i < 0 ? 0 : (i >= n ? n - 1 : i);
   if (wrap == Wrap::kRepeat) {
     const int r = i % n;

@@ -20,6 +20,7 @@
 #include "methods/light_tree/light_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
 #include "methods/vpl/vpl_kernel.h"
+#include "methods/substitute_tree/substitute_build_kernel.h"
 #include "scene/bsdf.h"
 #include "scene/camera_kernel.h"
 #include "scene/scene_view.h"
@@ -103,5 +104,9 @@ template void cuda::launch<PathPixelsKernel>(int, const PathPixelsKernel&, cudaS
 template void cuda::launch<PathLightKernel>(int, const PathLightKernel&, cudaStream_t);
 template void cuda::launch<VplEmitKernel>(int, const VplEmitKernel&, cudaStream_t);
 template void cuda::launch<VplBounceKernel>(int, const VplBounceKernel&, cudaStream_t);
+template void cuda::launch<SubstituteKeyKernel>(int, const SubstituteKeyKernel&, cudaStream_t);
+template void cuda::launch<SubstituteMortonKernel>(int, const SubstituteMortonKernel&, cudaStream_t);
+template void cuda::launch<SubstitutePrefixKernel>(int, const SubstitutePrefixKernel&, cudaStream_t);
+template void cuda::launch<SubstituteMergeKernel>(int, const SubstituteMergeKernel&, cudaStream_t);
 
 }  // namespace lumigrove

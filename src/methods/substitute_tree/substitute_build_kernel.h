@@ -103,32 +103,37 @@ struct SubstitutePrefixKernel {
   }
 };
 
-LUMI_HD LUMI_ALWAYS_INLINE Distribution leaf_distribution(const Vpl& vpl) {
-  return {vpl.position, 1, vpl.intensity, vpl.normal, {}};
+// By components: GCC copies a whole vec3 that was just computed through memory, twelve cycles late.
+LUMI_HD LUMI_ALWAYS_INLINE void store(vec3 v, vec3& to) {
+  to.x = v.x;
+  to.y = v.y;
+  to.z = v.z;
 }
 
 // Weighted by the children's intensities; of which neither is zero unless both are too small for a sum.
-LUMI_HD LUMI_ALWAYS_INLINE Distribution merge_distributions(const Distribution& a, const Distribution& b, float weight_a,
-                                                            float weight_b) {
+LUMI_HD LUMI_ALWAYS_INLINE void merge_distributions(const Distribution& a, const Distribution& b, float weight_a,
+                                                    float weight_b, Distribution& sum) {
   const float total = weight_a + weight_b;
   const float share_b = total > 0 ? weight_b / total : 0.5f, share_a = 1 - share_b;
   const vec3 apart = b.mean - a.mean;
-  Distribution sum;
-  sum.intensity = a.intensity + b.intensity;
-  sum.mean = a.mean + apart * share_b;  // (1)
+  store(a.intensity + b.intensity, sum.intensity);
+  store(a.mean + apart * share_b, sum.mean);  // (1)
   sum.nu = a.nu * b.nu * glm::clamp(glm::dot(a.normal, b.normal), 0.0f, 1.0f);
   const vec3 normal = a.normal * share_a + b.normal * share_b;
   const float length2 = length_squared(normal);
   const bool opposed = !(length2 > 1e-10f);
-  sum.normal = opposed ? a.normal : normal * (1 / glm::sqrt(length2));
+  store(opposed ? a.normal : normal * (1 / glm::sqrt(length2)), sum.normal);
   if (opposed) sum.nu = 0;
   // (2): both means' offsets from the new one make one term.
   const vec3 spread = apart * (share_a * share_b);
-  const float outer[6] = {apart.x * spread.x, apart.y * spread.y, apart.z * spread.z,
-                          apart.x * spread.y, apart.x * spread.z, apart.y * spread.z};
-  for (int k = 0; k < 6; ++k)
-    sum.covariance[k] = a.covariance[k] * share_a + b.covariance[k] * share_b + outer[k];
-  return sum;
+  const float *ca = a.covariance, *cb = b.covariance;
+  const auto add = [&](int k, float outer) { return ca[k] * share_a + (cb[k] * share_b + outer); };
+  sum.covariance[0] = add(0, apart.x * spread.x);
+  sum.covariance[1] = add(1, apart.y * spread.y);
+  sum.covariance[2] = add(2, apart.z * spread.z);
+  sum.covariance[3] = add(3, apart.x * spread.y);
+  sum.covariance[4] = add(4, apart.x * spread.z);
+  sum.covariance[5] = add(5, apart.y * spread.z);
 }
 
 // From leaf i upwards, as far as the other child of each parent has come already.
@@ -145,6 +150,7 @@ struct SubstituteMergeKernel {
 
   LUMI_HD void operator()(int i) const {
     prefetch_leaf(static_cast<std::uint32_t>(i) + kAhead);
+    prefetch_node(static_cast<std::uint32_t>(i) + kAhead);
     std::uint32_t first = static_cast<std::uint32_t>(i), last = first;
     bool left = is_left_child(first, last);
     do {
@@ -166,6 +172,13 @@ struct SubstituteMergeKernel {
     prefetch(&vpl.intensity.z);
   }
 
+  LUMI_HD LUMI_ALWAYS_INLINE void prefetch_node(std::uint32_t number) const {
+    if (number + 1 >= count) return;
+    prefetch_to_write(&nodes[number]);
+    prefetch_to_write(&distributions[number]);
+    prefetch_to_write(&extents[number]);
+  }
+
   // Whether the parent of the node over leaves first..last splits its own leaves after `last`: it is the ancestor whose
   // leaves have more bits in common. Not for the root.
   LUMI_HD bool is_left_child(std::uint32_t first, std::uint32_t last) const {
@@ -174,42 +187,48 @@ struct SubstituteMergeKernel {
 
   struct Child {
     Distribution distribution;
-    NodeExtent extent;
+    Box3 box;
+    PackedCone cone;
     float weight;
   };
-  LUMI_HD LUMI_ALWAYS_INLINE Child load_child(std::uint32_t number, bool leaf) const {
-    Child child;
+  // Also writes its record. `split_half`: 16 bits of the split.
+  LUMI_HD LUMI_ALWAYS_INLINE void load_child(std::uint32_t number, bool leaf, std::uint32_t split_half, Child& child,
+                                             ChildRecord& record) const {
     if (leaf) {
-      child.distribution = leaf_distribution(vpls[leaves[number]]);
-      const vec3 p = child.distribution.mean;
-      child.extent = {{p, p}, pack_normal(child.distribution.normal), ChildRecord::kLeaf};
+      const Vpl& vpl = vpls[leaves[number]];
+      child.distribution = {vpl.position, 1, vpl.intensity, vpl.normal, {}};
+      child.box = {vpl.position, vpl.position};
+      child.cone = pack_normal(vpl.normal);
+      child.weight = luminance(vpl.intensity);
+      record = {vpl.position, 0, split_half, ChildRecord::kLeaf, child.cone, child.weight};
     } else {
       child.distribution = distributions[number];
-      child.extent = extents[number];
+      const NodeExtent& extent = extents[number];
+      child.box = extent.box;
+      child.cone = extent.cone;
+      child.weight = luminance(child.distribution.intensity);
+      pack_child(child.box, child.distribution.mean, child.cone, child.weight, extent.flags, split_half, record);
     }
-    child.weight = luminance(child.distribution.intensity);
-    return child;
   }
 
   LUMI_HD void make_node(std::uint32_t number, std::uint32_t split, bool left_leaf, bool right_leaf) const {
-    const Child a = load_child(split, left_leaf), b = load_child(split + 1, right_leaf);
-    nodes[number].child[0] = pack(a, split & 0xffffu);
-    nodes[number].child[1] = pack(b, split >> 16);
-    Distribution sum = merge_distributions(a.distribution, b.distribution, a.weight, b.weight);
-    const Box3 box = unite(a.extent.box, b.extent.box);
-    sum.mean = glm::clamp(sum.mean, box.lo, box.hi);
-    distributions[number] = sum;
-    extents[number] = {box, unite(a.extent.cone, b.extent.cone), usable(sum, box) ? ChildRecord::kUsable : 0u};
+    Child a, b;
+    load_child(split, left_leaf, split & 0xffffu, a, nodes[number].child[0]);
+    load_child(split + 1, right_leaf, split >> 16, b, nodes[number].child[1]);
+    Distribution& sum = distributions[number];
+    merge_distributions(a.distribution, b.distribution, a.weight, b.weight, sum);
+    NodeExtent& extent = extents[number];
+    const vec3 lo = glm::min(a.box.lo, b.box.lo), hi = glm::max(a.box.hi, b.box.hi);
+    store(lo, extent.box.lo);
+    store(hi, extent.box.hi);
+    store(glm::clamp(sum.mean, lo, hi), sum.mean);
+    extent.cone = unite(a.cone, b.cone);
+    extent.flags = usable(sum, hi - lo) ? ChildRecord::kUsable : 0u;
   }
 
-  LUMI_HD static ChildRecord pack(const Child& child, std::uint32_t split_half) {
-    return pack_child(child.extent.box, child.distribution.mean, child.extent.cone, child.weight, child.extent.flags,
-                      split_half);
-  }
-
-  LUMI_HD bool usable(const Distribution& d, const Box3& box) const {  // (3)
-    return d.nu >= min_nu && glm::sqrt(glm::max(d.variance_along(d.normal), 0.0f)) <= max_sigma &&
-           box.diagonal() <= max_diagonal;
+  LUMI_HD bool usable(const Distribution& d, vec3 extent) const {  // (3)
+    return d.nu >= min_nu && d.variance_along(d.normal) <= max_sigma * max_sigma &&
+           length_squared(extent) <= max_diagonal * max_diagonal;
   }
 };
 

@@ -21,7 +21,7 @@ struct ChildRecord {
   vec3 lo;                     // of the box
   std::uint32_t extent_xy;     // of the box, bfloat16 rounded up: x in the low half, y in the high half
   std::uint32_t extent_z;      // z in the high half; in the low half 16 bits of the split (SubstituteNode::split)
-  std::uint32_t mean;          // 10 bits an axis (x lowest) of (mean - lo) / extent, and flags
+  std::uint32_t mean;          // 10 bits an axis (x lowest) of (mean - lo) / extent, 1 = kMeanSteps; and flags
   PackedCone cone;             // holds the normals of all lights below
   float intensity;             // Y of the lights' summed intensity, W/sr
 
@@ -53,19 +53,26 @@ LUMI_HD inline std::uint32_t pack_extent(float lo, float hi) {
 LUMI_HD inline std::uint32_t pack_mean(float lo, float inverse_extent, float mean) {
   constexpr float kTop = ChildRecord::kMeanSteps;
   const float steps = (mean - lo) * inverse_extent * kTop + 0.5f;
-  return steps > 0 ? (steps < kTop ? static_cast<std::uint32_t>(steps) : ChildRecord::kMeanSteps) : 0u;
+  const float positive = steps > 0 ? steps : 0;  // also where NaN
+  return static_cast<std::uint32_t>(static_cast<int>(positive < kTop ? positive : kTop));
 }
 
-// `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child.
-LUMI_HD inline ChildRecord pack_child(const Box3& box, vec3 mean, PackedCone cone, float intensity,
-                                      std::uint32_t flags, std::uint32_t split_half) {
+// `flags`: kLeaf, kUsable. `split_half`: 16 bits of the node's split, the low ones in the left child. Writes in place,
+// because a record copied right after it was made waits for its parts.
+LUMI_HD inline void pack_child(const Box3& box, vec3 mean, PackedCone cone, float intensity, std::uint32_t flags,
+                               std::uint32_t split_half, ChildRecord& child) {
   const std::uint32_t x = pack_extent(box.lo.x, box.hi.x), y = pack_extent(box.lo.y, box.hi.y),
                       z = pack_extent(box.lo.z, box.hi.z);
   const vec3 inverse = 1.0f / vec3(bfloat16_value(x), bfloat16_value(y), bfloat16_value(z));
   const std::uint32_t packed = pack_mean(box.lo.x, inverse.x, mean.x) |
                                pack_mean(box.lo.y, inverse.y, mean.y) << ChildRecord::kMeanBits |
                                pack_mean(box.lo.z, inverse.z, mean.z) << (2 * ChildRecord::kMeanBits);
-  return {box.lo, x | (y << 16), split_half | (z << 16), packed | flags, cone, intensity};
+  child.lo = box.lo;
+  child.extent_xy = x | (y << 16);
+  child.extent_z = split_half | (z << 16);
+  child.mean = packed | flags;
+  child.cone = cone;
+  child.intensity = intensity;
 }
 
 LUMI_HD inline vec3 unpack_extent(const ChildRecord& child) {

@@ -53,7 +53,7 @@ struct IndirectLightKernel {
       const ChosenVpl chosen = choose_vpl(sampler, vec2(u.x, u.y));
       if (!(chosen.pdf > 0)) continue;
       write(i, exact_vpl(sampler.lights.vpls[chosen.index], scale / chosen.pdf),
-            sampler.gloss ? Lobes::kBoth : Lobes::kDiffuse);
+            lights_gloss(sampler, surfaces[i]) ? Lobes::kBoth : Lobes::kDiffuse);
     }
   }
 
@@ -81,7 +81,7 @@ struct IndirectLightKernel {
       if (!lights_up(i)) continue;
       const Surface& surface = surfaces[i];
       const vec4 u = random_numbers(i, 0);
-      const float p = sampler.gloss ? diffuse_walk_probability(surface) : 1.0f;
+      const float p = diffuse_walk_probability(sampler, surface);
       if (u.x < p) {
         diffuse.set(diffuse_count, surface, vec3(u.y, u.z, u.w), false);
         diffuse_scale[diffuse_count] = scale / p;

@@ -33,7 +33,8 @@ struct VplSampler {
   float clamp = kInfinity;     // G_max, 1/m^2
   float substitute_offset = 0; // metres of a shadow ray that are skipped at a substitute
   float correction = 0;        // q
-  bool gloss = true;           // light gloss lobes too
+  bool gloss = true;           // light gloss lobes too,
+  float mirror_roughness = 0;  // but not of surfaces at most this rough
 };
 
 enum class Lobes : std::uint8_t { kDiffuse, kGloss, kBoth };
@@ -76,9 +77,13 @@ LUMI_HD inline Ray vpl_shadow_ray(const Surface& surface, const VplPoint& light)
   return ray;
 }
 
+LUMI_HD inline bool lights_gloss(const VplSampler& sampler, const Surface& s) {
+  return sampler.gloss && s.roughness > sampler.mirror_roughness && has_gloss(s);
+}
+
 // Probability of lighting the diffuse lobe when the two are lit one at a time.
-LUMI_HD inline float diffuse_walk_probability(const Surface& s) {
-  if (!has_gloss(s)) return 1;
+LUMI_HD inline float diffuse_walk_probability(const VplSampler& sampler, const Surface& s) {
+  if (!lights_gloss(sampler, s)) return 1;
   const float diffuse = glm::max(0.01f, luminance(s.diffuse));
   return diffuse / (diffuse + luminance(s.specular));
 }
