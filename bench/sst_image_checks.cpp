@@ -41,7 +41,9 @@ class ErrorStudy {
   }
 
   ErrorStudy(const std::string& scene, bool diffuse)
-      : scene_(load_scene(scene)), reference_(make_reference(scene_, diffuse, kReferenceSpp)) {}
+      : scene_(load_scene(scene)), reference_(make_reference(scene_, diffuse, kReferenceSpp)) {
+    fmt::print(stderr, "  reference of {}, {}: done\n", scene, diffuse ? "diffuse" : "glossy");
+  }
 
   const Reference& reference() const { return reference_; }
 
@@ -95,13 +97,9 @@ Estimate mean_difference(const std::vector<double>& a, const std::vector<double>
   return mean.estimate();
 }
 
-std::string rmse_note(const ImageErrors& a, const ImageErrors& b, const Reference& reference) {
-  const Estimate indirect = rmse_ratio(a.squared_indirect, b.squared_indirect);
-  return fmt::format("RMSE {:.4g} and {:.4g}, of indirect light alone {:.4g} and {:.4g} (ratio {:.3f} +- {:.3f}); the "
-                     "reference's own error {:.2g}",
-                     rmse_of(a.squared).value, rmse_of(b.squared).value, rmse_of(a.squared_indirect).value,
-                     rmse_of(b.squared_indirect).value, indirect.value, indirect.error,
-                     std::sqrt(reference.beauty_variance));
+std::string rmse_note(const std::vector<double>& a, const std::vector<double>& b, double reference_variance) {
+  return fmt::format("RMSE {:.4g} and {:.4g}; standard error of the reference {:.2g}, taken off", rmse_of(a).value,
+                     rmse_of(b).value, std::sqrt(reference_variance));
 }
 
 // --- 6: errors -------------------------------------------------------------------------------------------------
@@ -121,8 +119,11 @@ void report_errors(const PeerRow& row, const ImageErrors& sst, const ImageErrors
                    const Reference& reference, const Report& report) {
   const std::string where = fmt::format("{}, {} spp", row.diffuse ? "diffuse" : "glossy", spp);
   const Estimate ratio = rmse_ratio(sst.squared, slc.squared), ssim = mean_difference(sst.ssim, slc.ssim);
+  const Estimate indirect = rmse_ratio(sst.squared_indirect, slc.squared_indirect);
   report({6, row.scene, "RMSE sst / slc, " + where, fmt::format("{:.2f}", row.sst_rmse / row.slc_rmse), ratio.value,
-          ratio.error, {}, 1, rmse_note(sst, slc, reference)});
+          ratio.error, {}, 1, rmse_note(sst.squared, slc.squared, reference.beauty_variance)});
+  report({6, row.scene, "the same, indirect light alone", "", indirect.value, indirect.error, {}, 1,
+          rmse_note(sst.squared_indirect, slc.squared_indirect, reference.indirect_variance)});
   report({6, row.scene, "SSIM sst - slc, " + where, fmt::format("{:+.3f}", row.sst_ssim - row.slc_ssim), ssim.value,
           ssim.error, 0, {}, fmt::format("SSIM {:.4f} and {:.4f}", mean_of(sst.ssim).value, mean_of(slc.ssim).value)});
 }
@@ -193,11 +194,14 @@ void report_steps(const char* scene, const Report& report) {
   Study study(scene, settings);
   study.trace(settings);
   const SeenSurfaces seen(*study.world, settings);
-  const double sst = mean_steps(trace_walks(make_indirect_lighting(*study.world, settings, 0), seen));
-  const double slc = mean_steps(
-      trace_walks(make_indirect_lighting(*study.world, sized(slc_settings(true), kErrorWidth, kErrorHeight), 0), seen));
-  report({6, scene, "mean steps of a walk, sst / slc, 100 k VPLs", "15/20 = 0.75", sst / slc, 0, {}, 15.0 / 20,
-          fmt::format("{:.2f} and {:.2f}", sst, slc)});
+  const auto walks = [&](const Settings& method) {
+    return trace_walks(make_indirect_lighting(*study.world, method, 0), seen);
+  };
+  const std::vector<VplTrace> sst = walks(settings), slc = walks(sized(slc_settings(true), kErrorWidth, kErrorHeight));
+  report({6, scene, "mean steps of a walk, sst / slc, 100 k VPLs", "15/20 = 0.75", mean_steps(sst) / mean_steps(slc), 0,
+          {}, 15.0 / 20,
+          fmt::format("{:.2f} and {:.2f}; of the longest of {} walks side by side {:.2f} and {:.2f}", mean_steps(sst),
+                      mean_steps(slc), kWalkLanes, mean_longest_steps(sst), mean_longest_steps(slc))});
 }
 
 // --- 7: paths ----------------------------------------------------------------------------------------------------
@@ -217,7 +221,11 @@ Relation path_error(const PathRow& row, int bounces, int spp, const ImageErrors&
                     fmt::format("{:.2f}", row.rmse[bounces - 1] / row.sst_rmse), ratio.value, ratio.error};
   if (bounces == 1) relation.at_least = 1;
   if (bounces == 3) relation.at_most = 1;
-  relation.note = rmse_note(path, sst, reference);
+  const Estimate indirect = rmse_ratio(path.squared_indirect, sst.squared_indirect);
+  relation.note = fmt::format("{}; of indirect light alone {:.4g} and {:.4g}, ratio {:.3f} +- {:.3f}",
+                              rmse_note(path.squared, sst.squared, reference.beauty_variance),
+                              rmse_of(path.squared_indirect).value, rmse_of(sst.squared_indirect).value,
+                              indirect.value, indirect.error);
   return relation;
 }
 

@@ -145,8 +145,9 @@ double tone_mapped_ssim(const RgbImage& reference, const RgbImage& test) {
 }
 
 Reference make_reference(const Scene& scene, bool diffuse, int spp) {
-  constexpr int kBounces = 7, kPart = 16;
+  constexpr int kBounces = 7, kPart = 16, kDirectSpp = 8;
   Settings settings = sized(path_settings(diffuse, kBounces), kErrorWidth, kErrorHeight);
+  settings.direct.spp = kDirectSpp;
   const Study study(scene, settings);
   ImageMean image;
   std::vector<Mean> beauty, indirect;
@@ -216,6 +217,17 @@ double mean_steps(const std::vector<VplTrace>& traces) {
   Mean steps;
   for (const VplTrace& trace : traces)
     if (trace.steps > 0) steps.add(static_cast<double>(trace.steps));
+  return steps.mean();
+}
+
+double mean_longest_steps(const std::vector<VplTrace>& traces) {
+  Mean steps;
+  for (std::size_t first = 0; first < traces.size(); first += kWalkLanes) {
+    float longest = 0;
+    for (std::size_t i = first; i < std::min(traces.size(), first + kWalkLanes); ++i)
+      longest = std::max(longest, traces[i].steps);
+    if (longest > 0) steps.add(static_cast<double>(longest));
+  }
   return steps.mean();
 }
 

@@ -126,6 +126,8 @@ std::vector<vec3> light_surfaces(const IndirectLighting& lighting, const SeenSur
 std::vector<VplTrace> trace_walks(const IndirectLighting& lighting, const SeenSurfaces& seen);
 // Mean number of steps of a walk.
 double mean_steps(const std::vector<VplTrace>& traces);
+// Mean over rows of lanes of their longest walk: lanes wait for it.
+double mean_longest_steps(const std::vector<VplTrace>& traces);
 
 // --- time ------------------------------------------------------------------------------------------------------
 
