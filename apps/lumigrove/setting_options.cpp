@@ -113,13 +113,17 @@ void apply_file(const std::string& file, bool keep_preset, Settings& settings) {
   apply_settings(settings, values, file);
 }
 
-// An option without effect is a mistake of whoever gave it.
-void check_bounces(const SettingOptions& options, const Settings& settings) {
-  const auto wants_bounces = [](const auto& pair) {
-    return pair.first == "indirect.max_bounces" && pair.second != "0";
-  };
-  const bool asked = std::any_of(options.values.begin(), options.values.end(), wants_bounces);
-  if (asked && settings.indirect.transport == Transport::kNone)
+// --max-bounces means the bounces of paths or of virtual point lights, whichever the method has. An option without effect
+// is a mistake of whoever gave it.
+void apply_bounces(const SettingOptions& options, Settings& settings) {
+  const auto is_bounces = [](const auto& pair) { return pair.first == "indirect.max_bounces"; };
+  const auto asked = std::find_if(options.values.begin(), options.values.end(), is_bounces);
+  if (asked == options.values.end()) return;
+  if (settings.indirect.transport == Transport::kVpl) {
+    set_value(settings, "indirect.bounces", asked->second);
+    return;
+  }
+  if (asked->second != "0" && settings.indirect.transport == Transport::kNone)
     throw Error(
         fmt::format("--max-bounces needs a method with indirect light (--preset path), but '{}' has none",
                     settings.preset));
@@ -159,7 +163,7 @@ std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command) {
   add_value(command, options, "--seed", "seed");
   add_value(command, options, "-t,--threads,--nthreads", "threads");
   add_value(command, options, "--max-bounces", "indirect.max_bounces")
-      ->description("Most indirect bounces of a path, 0 = direct light only (default of the method)");
+      ->description("Most indirect bounces of a path or a virtual point light, 0 = direct light only (default of the method)");
   add_value(command, options, "--camera", "camera");
   add_value(command, options, "--fov", "fov");
   add_value(command, options, "--light-scale", "light_scale");
@@ -179,7 +183,7 @@ Settings make_settings(const SettingOptions& options) {
   for (const auto& [key, value] : options.values) set_value(settings, key, value);
   if (!options.crop_window.empty()) apply_crop_window(options.crop_window, settings);
   if (!options.pixel.empty()) apply_pixel(options.pixel, settings);
-  check_bounces(options, settings);
+  apply_bounces(options, settings);
   check(settings);
   return settings;
 }

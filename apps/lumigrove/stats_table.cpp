@@ -36,6 +36,19 @@ std::string structure_line(const StructureStats& s, std::uint64_t lights) {
   return fmt::format("{:<28}{:>12.2f}{:>15}{:>12}\n", s.name, s.build_ms, s.bytes, per_light);
 }
 
+// Those that serve emitters or those that serve virtual point lights, and their sum.
+std::string structure_lines(const RenderStats& stats, bool of_vpls, std::uint64_t lights, const char* sum_name) {
+  StructureStats sum{sum_name, 0, 0, lights, of_vpls};
+  std::string text;
+  for (const StructureStats& structure : stats.structures) {
+    if (structure.name == kAccelerationStructure || structure.of_vpls != of_vpls) continue;
+    text += structure_line(structure, lights);
+    sum.build_ms += structure.build_ms;
+    sum.bytes += structure.bytes;
+  }
+  return text.empty() ? text : text + structure_line(sum, lights);
+}
+
 }  // namespace
 
 void add_stats_option(CLI::App& command, bool& stats) {
@@ -56,12 +69,12 @@ void accumulate(RenderStats& total, const RenderStats& frame) {
     sum.build_ms += structure.build_ms;
     sum.bytes = structure.bytes;
     sum.elements = structure.elements;
+    sum.of_vpls = structure.of_vpls;
   }
 }
 
 std::string stats_table(const RenderStats& stats, int frames) {
-  std::uint64_t rays = 0, light_bytes = 0;
-  double light_build_ms = 0;
+  std::uint64_t rays = 0;
   std::string text = fmt::format("{:<28}{:>12}{:>15}{:>12}\n", "pass", "ms", "rays", "Mrays/s");
   for (const PassStats& pass : stats.passes) {
     text += pass_line(pass.name, pass.ms, pass.rays);
@@ -69,14 +82,13 @@ std::string stats_table(const RenderStats& stats, int frames) {
   }
   text += pass_line("total", stats.total_ms, rays);
   text += fmt::format("\n{:<28}{:>12}{:>15}{:>12}\n", "structure", "build ms", "bytes", "bytes/light");
+  std::uint64_t vpls = 0;
   for (const StructureStats& structure : stats.structures) {
-    text += structure_line(structure, stats.emitters);
-    if (structure.name == kAccelerationStructure) continue;
-    light_build_ms += structure.build_ms;
-    light_bytes += structure.bytes;
+    if (structure.name == kAccelerationStructure) text += structure_line(structure, 0);
+    if (structure.of_vpls) vpls = std::max(vpls, structure.elements);
   }
-  text +=
-      structure_line({"all that serve lights", light_build_ms, light_bytes, stats.emitters}, stats.emitters);
+  text += structure_lines(stats, false, stats.emitters, "all that serve lights");
+  text += structure_lines(stats, true, vpls, "all that serve VPLs");
   text += fmt::format("\n{} emitters, {} spp, peak memory {:.1f} MB\n", stats.emitters, stats.spp_done,
                       peak_megabytes());
   if (frames > 1)

@@ -21,10 +21,11 @@ struct PassStats {
 inline constexpr const char* kAccelerationStructure = "acceleration structure";
 
 struct StructureStats {
-  std::string name;         // kAccelerationStructure, "light set", "perfect tree", "alias table"
+  std::string name;         // kAccelerationStructure, "light set", "perfect tree", "alias table", "VPLs", ...
   double build_ms = 0;
   std::uint64_t bytes = 0;
   std::uint64_t elements = 0;
+  bool of_vpls = false;     // serves virtual point lights, not emitters
 };
 struct RenderStats {
   int spp_done = 0;         // below settings.spp when cancelled

@@ -234,20 +234,20 @@ void trace_vpls(World& world, const Settings& settings, int sample, RenderStats&
   world.vpls.trace(tracing);
   const VplView vpls = world.vpls.view();
   add_pass_ms(stats, "VPL paths", world.vpls.trace_ms(), world.vpls.rays());
-  set_structure(stats, {"VPLs", world.vpls.trace_ms(), world.vpls.bytes(), vpls.vpls.size()});
+  set_structure(stats, {"VPLs", world.vpls.trace_ms(), world.vpls.bytes(), vpls.vpls.size(), true});
   if (indirect.selection == Selection::kRoot) {
     const float d = vpls.diagonal;
     world.substitutes.build(vpls, {indirect.topology, indirect.min_nu, indirect.max_sigma * d,
                                    indirect.max_diagonal > 0 ? indirect.max_diagonal * d : kInfinity});
     set_structure(stats, {"substitute tree", world.substitutes.build_ms(), world.substitutes.bytes(),
-                          world.substitutes.view().count});
+                          world.substitutes.view().count, true});
   }
   if (indirect.selection == Selection::kPower) {
     const Stopwatch watch;
     std::vector<float> power(vpls.vpls.size());
     for (std::size_t i = 0; i < power.size(); ++i) power[i] = luminance(vpls.vpls[i].intensity);
     world.vpl_alias.build(power);
-    set_structure(stats, {"VPL alias table", watch.ms(), world.vpl_alias.bytes(), power.size()});
+    set_structure(stats, {"VPL alias table", watch.ms(), world.vpl_alias.bytes(), power.size(), true});
   }
 }
 

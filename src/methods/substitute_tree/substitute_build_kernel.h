@@ -196,7 +196,7 @@ struct SubstituteMergeKernel {
                                              ChildRecord& record) const {
     if (leaf) {
       const Vpl& vpl = vpls[leaves[number]];
-      child.distribution = {vpl.position, 1, vpl.intensity, vpl.normal, {}};
+      child.distribution = {vpl.position, 1, vpl.normal, vpl.intensity, {}};
       child.box = {vpl.position, vpl.position};
       child.cone = pack_normal(vpl.normal);
       child.weight = luminance(vpl.intensity);

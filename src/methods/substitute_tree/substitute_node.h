@@ -7,6 +7,7 @@
 // inner node of that number. With one light there is no inner node; the root is then leaf 0.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -101,12 +102,13 @@ struct alignas(64) SubstituteNode {
 };
 static_assert(sizeof(ChildRecord) == 32 && sizeof(SubstituteNode) == 64);
 
-// One cache line: the lights below a node as one Gaussian. Of a single light: mean = position, covariance 0, nu 1.
+// One cache line: the lights below a node as one Gaussian. Of a single light: mean = position, covariance 0, nu 1. The
+// first ten words mean the same as a Vpl's, but for nu, so that both are read alike.
 struct alignas(64) Distribution {
   vec3 mean;            // weighted by intensity, world
   float nu;             // agreement of the normals: product over all merges of max(n1 . n2, 0)
-  vec3 intensity;       // summed, W/sr
   vec3 normal;          // unit, weighted by intensity
+  vec3 intensity;       // summed, W/sr
   float covariance[6];  // xx, yy, zz, xy, xz, yz; world, m^2
 
   LUMI_HD vec3 times_covariance(vec3 v) const {
@@ -116,7 +118,8 @@ struct alignas(64) Distribution {
   }
   LUMI_HD float variance_along(vec3 direction) const { return glm::dot(direction, times_covariance(direction)); }
 };
-static_assert(sizeof(Distribution) == 64);
+static_assert(sizeof(Distribution) == 64 && offsetof(Distribution, normal) == offsetof(Vpl, normal) &&
+              offsetof(Distribution, intensity) == offsetof(Vpl, intensity));
 
 // During the build only: what the parent of an inner node needs and does not find in the Distribution.
 struct alignas(32) NodeExtent {

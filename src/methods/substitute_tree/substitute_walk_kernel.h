@@ -59,6 +59,10 @@ struct alignas(64) SubstituteWalkPoints {
   float normal[3][kSubstituteWalks] = {};
   float tangent[2][3][kSubstituteWalks] = {};  // with the normal an orthonormal frame
   float u[3][kSubstituteWalks] = {};           // uniform in [0,1)
+  // Not for the walk, but for lighting the surface by what it ends at
+  float geometric_normal[3][kSubstituteWalks] = {};
+  float diffuse[3][kSubstituteWalks] = {};
+  float epsilon[kSubstituteWalks] = {};
   // Gloss only
   float wo[3][kSubstituteWalks] = {};
   float mirror[3][kSubstituteWalks] = {};      // R, unit
@@ -74,10 +78,13 @@ struct alignas(64) SubstituteWalkPoints {
       tangent[0][axis][i] = frame.x[axis];
       tangent[1][axis][i] = frame.y[axis];
       u[axis][i] = numbers[axis];
+      geometric_normal[axis][i] = s.geometric_normal[axis];
+      diffuse[axis][i] = s.diffuse[axis];
       if (!gloss) continue;
       wo[axis][i] = s.wo[axis];
       mirror[axis][i] = reflected[axis];
     }
+    epsilon[i] = s.epsilon;
     if (!gloss) return;
     const float alpha = s.roughness * s.roughness;
     alpha2[i] = alpha * alpha;
@@ -154,13 +161,18 @@ LUMI_HD LUMI_ALWAYS_INLINE Lanes<L> signed_byte(const IntLanes<L>& word, int byt
   return to_float<L>((word << (24 - 8 * byte)) >> 24);
 }
 
+// Words 3 and 4 of a ChildRecord.
+template <int L>
+LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> unpack_extents(const IntLanes<L>& xy, const IntLanes<L>& z) {
+  constexpr auto kHigh = static_cast<std::int32_t>(0xffff0000u);
+  return {from_bits<L>(xy << 16), from_bits<L>(xy & kHigh), from_bits<L>(z & kHigh)};
+}
+
 template <int L>
 LUMI_HD LUMI_ALWAYS_INLINE ChildLanes<L> unpack_child(const Lanes<L>* words, const LaneVec3<L>& x) {
   ChildLanes<L> child;
-  const IntLanes<L> xy = bits_of<L>(words[3]), z = bits_of<L>(words[4]), mean = bits_of<L>(words[5]),
-                    cone = bits_of<L>(words[6]);
-  const LaneVec3<L> extent{from_bits<L>(xy << 16), from_bits<L>(xy & static_cast<std::int32_t>(0xffff0000u)),
-                           from_bits<L>(z & static_cast<std::int32_t>(0xffff0000u))};
+  const IntLanes<L> mean = bits_of<L>(words[5]), cone = bits_of<L>(words[6]);
+  const LaneVec3<L> extent = unpack_extents<L>(bits_of<L>(words[3]), bits_of<L>(words[4]));
   const auto share = [&](int shift) { return to_float<L>((mean >> shift) & 1023) * (1.0f / 1023); };
   child.lo = {words[0] - x.x, words[1] - x.y, words[2] - x.z};
   child.hi = {child.lo.x + extent.x, child.lo.y + extent.y, child.lo.z + extent.z};
@@ -319,27 +331,26 @@ struct PairWeights {
   Lanes<L> left, right;
 };
 
-// Equation 5 for both children.
+// Equation 5 for both children, times what the distances of both divide by: the shares are the same.
 template <int L, bool kGloss>
 LUMI_HD LUMI_ALWAYS_INLINE PairWeights<L> weigh_children(const SubstituteWalk& walk, const WalkLanes<L>& walks,
                                                          const ChildLanes<L>& left, const ChildLanes<L>& right) {
   const ChildShine<L> a = shine_of_child<L, kGloss>(walk, walks, left);
   const ChildShine<L> b = shine_of_child<L, kGloss>(walk, walks, right);
-  const Lanes<L> floor2 = broadcast<L>(walk.floor2), one = broadcast<L>(1);
+  const Lanes<L> floor2 = broadcast<L>(walk.floor2), one = broadcast<L>(1), zero = broadcast<L>(0);
   if (walk.weight == IndirectWeights::kDistanceBounded)
-    return {a.shine / max_lanes<L>(a.mean2, floor2), b.shine / max_lanes<L>(b.mean2, floor2)};
-  Lanes<L> divide_a = a.near2, divide_b = b.near2;
+    return {a.shine * max_lanes<L>(b.mean2, floor2), b.shine * max_lanes<L>(a.mean2, floor2)};
+  Lanes<L> divide_a, divide_b;
   if (walk.weight == IndirectWeights::kInBox) {
-    const Lanes<L> zero = broadcast<L>(0);
     divide_a = choose_where_greater<L>(a.near2, zero, max_lanes<L>(a.mean2, floor2), one);
     divide_b = choose_where_greater<L>(b.near2, zero, max_lanes<L>(b.mean2, floor2), one);
   } else {
     // Either child's box is wider than far away: distances would say nothing. Two lights have no width.
     const Lanes<L> too_near = max_lanes<L>(a.diagonal2 - a.near2, b.diagonal2 - b.near2);
-    divide_a = choose_where_greater<L>(too_near, broadcast<L>(0), one, max_lanes<L>(a.near2, floor2));
-    divide_b = choose_where_greater<L>(too_near, broadcast<L>(0), one, max_lanes<L>(b.near2, floor2));
+    divide_a = choose_where_greater<L>(too_near, zero, one, max_lanes<L>(a.near2, floor2));
+    divide_b = choose_where_greater<L>(too_near, zero, one, max_lanes<L>(b.near2, floor2));
   }
-  return {a.shine / divide_a, b.shine / divide_b};
+  return {a.shine * divide_b, b.shine * divide_a};
 }
 
 // --- walks -------------------------------------------------------------------------------------------------
@@ -354,6 +365,7 @@ struct alignas(64) SubstituteWalkState {
   float r[kSubstituteWalks];
   float steps[kSubstituteWalks];
   float going[kSubstituteWalks];         // 1 while the walk goes on
+  bool at_root;                          // no walk leaves the root
 };
 
 // The step of a group of walks; those that have ended stay where they are. Does any go on?
@@ -378,7 +390,7 @@ LUMI_HD LUMI_ALWAYS_INLINE bool step_substitute_walks(const SubstituteWalk& walk
   // target == left counts as beyond: r = left / total leaves [left, total) to the right child.
   const Lanes<L> side = choose_where_greater<L>(zero, go_right, zero, one);
   const Lanes<L> weight = choose_where_greater<L>(side, zero, weights.right, weights.left);
-  const Lanes<L> rest = choose_where_greater<L>(side, zero, target - weights.left, target) / weight;
+  const Lanes<L> rest = choose_where_greater<L>(side, zero, target - weights.left, target) * reciprocal<L>(weight);
   const Lanes<L> going = load_lanes<L>(state.going + first);
   const Lanes<L> alive = choose_where_greater<L>(total, zero, going, zero);
 
@@ -396,7 +408,7 @@ LUMI_HD LUMI_ALWAYS_INLINE bool step_substitute_walks(const SubstituteWalk& walk
     store_lanes<L>(choose_where_greater<L>(where, zero, now, load_lanes<L>(kept)), kept);
   };
   const Lanes<L> pdf = load_lanes<L>(state.pdf + first);
-  const Lanes<L> stepped = choose_where_greater<L>(total, zero, pdf * (weight / total), zero);
+  const Lanes<L> stepped = choose_where_greater<L>(total, zero, pdf * (weight * reciprocal<L>(total)), zero);
   store_lanes<L>(choose_where_greater<L>(going, zero, stepped, pdf), state.pdf + first);
   store_lanes<L>(min_lanes<L>(max_lanes<L>(rest, zero), broadcast<L>(0x1.fffffep-1f)), state.r + first);
   store_lanes<L>(load_lanes<L>(state.steps + first) + going, state.steps + first);
@@ -410,39 +422,20 @@ LUMI_HD LUMI_ALWAYS_INLINE bool step_substitute_walks(const SubstituteWalk& walk
   return greater_bits<L>(goes_on, zero) != 0;
 }
 
-LUMI_HD inline WalkResult walk_result(const SubstituteWalk& walk, const SubstituteWalkState& state, int i) {
-  WalkResult result;
-  result.steps = static_cast<int>(state.steps[i]);
-  result.pdf = state.pdf[i];
-  if (!(result.pdf > 0)) return result;
-  const SubstituteNode& parent = walk.tree.nodes[state.parent[i]];
-  result.end = (state.flags[i] & ChildRecord::kLeaf) != 0 ? WalkEnd::kLeaf : WalkEnd::kSubstitute;
-  result.node = state.child[i];
-  if (result.end == WalkEnd::kSubstitute) result.box = unpack_box(parent.child[result.node - parent.split()]);
-  return result;
-}
-
 // One walk for each of the first `count` points, count <= kSubstituteWalks.
 template <bool kGloss>
-LUMI_HD inline void walk_substitute_tree(const SubstituteWalk& walk, const SubstituteWalkPoints& points, int count,
-                                         WalkResult* results) {
+LUMI_HD inline void walk_to_ends(const SubstituteWalk& walk, const SubstituteWalkPoints& points, int count,
+                                 SubstituteWalkState& state) {
   const SubstituteTreeView& tree = walk.tree;
-  const bool stop_at_root = tree.count <= 1 || (walk.substitutes && !kGloss && tree.root_usable);
-  if (stop_at_root) {
-    const WalkEnd end = tree.count == 1 ? WalkEnd::kLeaf : WalkEnd::kSubstitute;
-    for (int i = 0; i < count; ++i) {
-      results[i] = {};
-      if (tree.count > 0) results[i] = {end, 0, tree.bounds, 1, 0};
-    }
-    return;
-  }
-  SubstituteWalkState state;
+  state.at_root = tree.count <= 1 || (walk.substitutes && !kGloss && tree.root_usable);
   for (int i = 0; i < kSubstituteWalks; ++i) {
-    state.node[i] = state.parent[i] = state.child[i] = state.flags[i] = 0;
+    state.node[i] = state.parent[i] = state.child[i] = 0;
+    state.flags[i] = tree.count == 1 ? ChildRecord::kLeaf : ChildRecord::kUsable;
     state.r[i] = state.steps[i] = 0;
-    state.pdf[i] = 1;
+    state.pdf[i] = tree.count > 0 && i < count ? 1.0f : 0.0f;
     state.going[i] = i < count ? 1.0f : 0.0f;
   }
+  if (state.at_root) return;
   bool going[kWalkGroups];
   for (int g = 0; g < kWalkGroups; ++g) going[g] = g * kWalkLanes < count;
   bool any = true;
@@ -454,6 +447,36 @@ LUMI_HD inline void walk_substitute_tree(const SubstituteWalk& walk, const Subst
       any = any || going[g];
     }
   }
+}
+
+LUMI_HD inline WalkEnd end_of_walk(const SubstituteWalkState& state, int i) {
+  if (!(state.pdf[i] > 0)) return WalkEnd::kDead;
+  return (state.flags[i] & ChildRecord::kLeaf) != 0 ? WalkEnd::kLeaf : WalkEnd::kSubstitute;
+}
+
+// What the parent knows of the child that a walk ended at; not for walks that ended at the root.
+LUMI_HD inline const ChildRecord& record_of_end(const SubstituteWalk& walk, const SubstituteWalkState& state, int i) {
+  const SubstituteNode& parent = walk.tree.nodes[state.parent[i]];
+  return parent.child[(state.child[i] - parent.split()) & 1];  // of dead walks any
+}
+
+LUMI_HD inline WalkResult walk_result(const SubstituteWalk& walk, const SubstituteWalkState& state, int i) {
+  WalkResult result;
+  result.end = end_of_walk(state, i);
+  result.steps = static_cast<int>(state.steps[i]);
+  result.pdf = state.pdf[i];
+  result.node = state.child[i];
+  if (result.end == WalkEnd::kSubstitute)
+    result.box = state.at_root ? walk.tree.bounds : unpack_box(record_of_end(walk, state, i));
+  return result;
+}
+
+// The same, as one result for each walk.
+template <bool kGloss>
+LUMI_HD inline void walk_substitute_tree(const SubstituteWalk& walk, const SubstituteWalkPoints& points, int count,
+                                         WalkResult* results) {
+  SubstituteWalkState state;
+  walk_to_ends<kGloss>(walk, points, count, state);
   for (int i = 0; i < count; ++i) results[i] = walk_result(walk, state, i);
 }
 
@@ -475,8 +498,8 @@ LUMI_HD inline vec2 child_probabilities(const SubstituteWalk& walk, const Substi
                                 unpack_child<L>(words + kNodeWords / 2, walks.position));
   const Lanes<L> total = weights.left + weights.right;
   float left[L], right[L], totals[L];
-  store_lanes<L>(weights.left / total, left);
-  store_lanes<L>(weights.right / total, right);
+  store_lanes<L>(weights.left * reciprocal<L>(total), left);
+  store_lanes<L>(weights.right * reciprocal<L>(total), right);
   store_lanes<L>(total, totals);
   return totals[i - first] > 0 ? vec2(left[i - first], right[i - first]) : vec2(0);
 }
@@ -502,30 +525,6 @@ LUMI_HD inline float pdf_substitute_leaf(const SubstituteWalk& walk, const Subst
     node = split + static_cast<std::uint32_t>(side);
   }
   return 0;
-}
-
-// --- drawing from a substitute -----------------------------------------------------------------------------
-
-// Three independent standard normal numbers from four uniform ones (Box, Muller 1958).
-LUMI_HD inline vec3 sample_standard_normal(vec4 u) {
-  const float r0 = glm::sqrt(-2 * glm::log(glm::max(1 - u.x, 1e-12f)));
-  const float r1 = glm::sqrt(-2 * glm::log(glm::max(1 - u.z, 1e-12f)));
-  const float phi0 = 2 * kPi * u.y;
-  return vec3(r0 * glm::cos(phi0), r0 * glm::sin(phi0), r1 * glm::cos(2 * kPi * u.w));
-}
-
-// A point with the distribution's mean and covariance (Cholesky factor times normal numbers), clamped to the box.
-LUMI_HD inline vec3 sample_distribution(const Distribution& d, const Box3& box, vec4 u) {
-  const vec3 xi = sample_standard_normal(u);
-  const float* c = d.covariance;
-  const float l00 = safe_sqrt(c[0]);
-  const float inverse00 = l00 > 0 ? 1 / l00 : 0.0f;
-  const float l10 = c[3] * inverse00, l20 = c[4] * inverse00;
-  const float l11 = safe_sqrt(c[1] - l10 * l10);
-  const float l21 = l11 > 0 ? (c[5] - l20 * l10) / l11 : 0.0f;
-  const float l22 = safe_sqrt(c[2] - l20 * l20 - l21 * l21);
-  const vec3 p = d.mean + vec3(l00 * xi.x, l10 * xi.x + l11 * xi.y, l20 * xi.x + l21 * xi.y + l22 * xi.z);
-  return glm::clamp(p, box.lo, box.hi);
 }
 
 }  // namespace lumigrove

@@ -101,29 +101,111 @@ struct IndirectLightKernel {
                                          const float* lobe_scale) const {
     SubstituteWalk walk = sampler.walk;
     walk.substitutes = walk.substitutes && part == CorrectionPart::kSubstitute;
-    WalkResult results[kSubstituteWalks];
-    walk_substitute_tree<kGloss>(walk, points, count, results);
-    for (int k = 0; k < count; ++k) prefetch_end(results[k]);
+    if (walk.tree.count == 0) return;
+    SubstituteWalkState state;
+    walk_to_ends<kGloss>(walk, points, count, state);
+    prefetch_ends(walk.tree, state, count);
+    alignas(64) float gaussian[4][kSubstituteWalks] = {}, weight[kSubstituteWalks] = {};
     for (int k = 0; k < count; ++k) {
-      const std::size_t i = index[k];
-      const WalkResult& result = results[k];
-      if (!traces.empty()) traces[i] = {static_cast<float>(result.steps), 0, false, false, false};
-      if (result.end == WalkEnd::kDead) continue;
-      const bool substitute = result.end == WalkEnd::kSubstitute;
-      VplPoint light = vpl_of_walk(sampler, result, substitute ? random_numbers(i, 1) : vec4(0));
-      light.intensity *= lobe_scale[k] * correct(i, substitute);
-      if (!traces.empty()) note(i, result, light);
-      write(i, light, kGloss ? Lobes::kGloss : Lobes::kDiffuse);
+      const bool substitute = end_of_walk(state, k) == WalkEnd::kSubstitute;
+      weight[k] = lobe_scale[k] * correct(index[k], substitute);
+      if (!substitute) continue;
+      const vec4 u = random_numbers(index[k], 1);
+      for (int axis = 0; axis < 4; ++axis) gaussian[axis][k] = u[axis];
+    }
+    for (int first = 0; first < count; first += kWalkLanes)
+      finish_group<kGloss>(walk, points, state, first, glm::min(count - first, kWalkLanes), gaussian, weight, index);
+  }
+
+  LUMI_HD LUMI_ALWAYS_INLINE void prefetch_ends(const SubstituteTreeView& tree, const SubstituteWalkState& state,
+                                                int count) const {
+    for (int k = 0; k < count; ++k) {
+      if ((state.flags[k] & ChildRecord::kLeaf) != 0)
+        prefetch(tree.leaves + state.child[k]);
+      else
+        prefetch(tree.distributions + state.child[k]);
+    }
+    for (int k = 0; k < count; ++k)
+      if ((state.flags[k] & ChildRecord::kLeaf) != 0) prefetch(&tree.leaf(state.child[k]));
+  }
+
+  template <bool kGloss>
+  LUMI_HD LUMI_ALWAYS_INLINE void finish_group(const SubstituteWalk& walk, const SubstituteWalkPoints& points,
+                                               const SubstituteWalkState& state, int first, int count,
+                                               const float (&gaussian)[4][kSubstituteWalks], const float* weight,
+                                               const std::size_t* index) const {
+    constexpr int L = kWalkLanes;
+    Lanes<L> u[4];
+    for (int k = 0; k < 4; ++k) u[k] = load_lanes<L>(gaussian[k] + first);
+    LightLanes<L> light = draw_lights<L>(walk, state, first, u);
+    const Lanes<L> scales = load_lanes<L>(weight + first);
+    light.intensity = {light.intensity.x * scales, light.intensity.y * scales, light.intensity.z * scales};
+    if (!traces.empty()) note(walk, state, first, count, light, index);
+    if constexpr (kGloss)
+      write_gloss(light, first, count, index);
+    else
+      write_diffuse(light_diffuse_lobes<L>(sampler, points, first, light), first, count, index);
+  }
+
+  LUMI_HD LUMI_ALWAYS_INLINE void write_diffuse(const LitLanes<kWalkLanes>& lit, int first, int count,
+                                                const std::size_t* index) const {
+    constexpr int L = kWalkLanes;
+    const Lanes<L> columns[8] = {lit.origin.x,    lit.origin.y,    lit.origin.z,    lit.tmin,
+                                 lit.direction.x, lit.direction.y, lit.direction.z, lit.tmax};
+    alignas(64) float ray[8][L], radiance[3][L];
+    for (int w = 0; w < 8; ++w) store_lanes<L>(columns[w], ray[w]);
+    store_lanes<L>(lit.radiance.x, radiance[0]);
+    store_lanes<L>(lit.radiance.y, radiance[1]);
+    store_lanes<L>(lit.radiance.z, radiance[2]);
+    forget_registers();
+    for (int k = 0; k < count; ++k) {
+      if (!(ray[7][k] > 0)) continue;
+      const std::size_t i = index[first + k];
+      Ray& to = shadow[i];
+      to.origin.x = ray[0][k], to.origin.y = ray[1][k], to.origin.z = ray[2][k], to.tmin = ray[3][k];
+      to.direction.x = ray[4][k], to.direction.y = ray[5][k], to.direction.z = ray[6][k], to.tmax = 1;
+      vec3& sent = contribution[i];
+      sent.x = radiance[0][k], sent.y = radiance[1][k], sent.z = radiance[2][k];
     }
   }
 
-  LUMI_HD LUMI_ALWAYS_INLINE void prefetch_end(const WalkResult& result) const {
-    if (result.end == WalkEnd::kLeaf) {
-      prefetch(&sampler.walk.tree.leaf(result.node));
-    } else if (result.end == WalkEnd::kSubstitute) {
-      prefetch(sampler.walk.tree.distributions + result.node);
+  LUMI_HD LUMI_ALWAYS_INLINE void write_gloss(const LightLanes<kWalkLanes>& light, int first, int count,
+                                              const std::size_t* index) const {
+    const DrawnLights drawn(light);
+    for (int k = 0; k < count; ++k) {
+      if (!(drawn.alive[k] > 0)) continue;
+      VplPoint point = drawn.point(k);
+      if (drawn.substitute[k] > 0) point.skip = sampler.substitute_offset;
+      write(index[first + k], point, Lobes::kGloss);
     }
   }
+
+  // LightLanes one by one.
+  struct DrawnLights {
+    float position[3][kWalkLanes], normal[3][kWalkLanes], intensity[3][kWalkLanes], free_position[3][kWalkLanes];
+    float epsilon[kWalkLanes], substitute[kWalkLanes], alive[kWalkLanes];
+
+    LUMI_HD explicit DrawnLights(const LightLanes<kWalkLanes>& light) {
+      store(light.position, position);
+      store(light.normal, normal);
+      store(light.intensity, intensity);
+      store(light.free_position, free_position);
+      store_lanes<kWalkLanes>(light.epsilon, epsilon);
+      store_lanes<kWalkLanes>(light.substitute, substitute);
+      store_lanes<kWalkLanes>(light.alive, alive);
+    }
+    LUMI_HD static void store(const LaneVec3<kWalkLanes>& from, float (&to)[3][kWalkLanes]) {
+      store_lanes<kWalkLanes>(from.x, to[0]);
+      store_lanes<kWalkLanes>(from.y, to[1]);
+      store_lanes<kWalkLanes>(from.z, to[2]);
+    }
+    LUMI_HD static vec3 at(const float (&from)[3][kWalkLanes], int k) {
+      return vec3(from[0][k], from[1][k], from[2][k]);
+    }
+    LUMI_HD VplPoint point(int k) const {
+      return {at(position, k), at(normal, k), at(intensity, k), epsilon[k], 0};
+    }
+  };
 
   // Weight of this part of S + (L - S) / q.
   LUMI_HD float correct(std::size_t i, bool substitute) const {
@@ -133,19 +215,25 @@ struct IndirectLightKernel {
     return corrected[i] ? 1 - 1 / sampler.correction : 1.0f;
   }
 
-  LUMI_HD void note(std::size_t i, const WalkResult& result, const VplPoint& light) const {
-    VplTrace& trace = traces[i];
-    trace.substitute = result.end == WalkEnd::kSubstitute;
-    if (trace.substitute) {
-      trace.size = result.box.diagonal();
-      const vec3 p = light.position;
-      for (int axis = 0; axis < 3; ++axis)
-        trace.boxed = trace.boxed || ((p[axis] == result.box.lo[axis] || p[axis] == result.box.hi[axis]) &&
-                                      result.box.lo[axis] < result.box.hi[axis]);
+  LUMI_HD void note(const SubstituteWalk& walk, const SubstituteWalkState& state, int first, int count,
+                    const LightLanes<kWalkLanes>& light, const std::size_t* index) const {
+    const DrawnLights drawn(light);
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = index[first + k];
+      const WalkResult result = walk_result(walk, state, first + k);
+      VplTrace& trace = traces[i];
+      trace = {static_cast<float>(result.steps), 0, false, false, false};
+      if (result.end == WalkEnd::kDead) continue;
+      const VplPoint point = drawn.point(k);
+      if (result.end == WalkEnd::kSubstitute) {
+        trace.size = result.box.diagonal();
+        trace.substitute = true;
+        trace.boxed = DrawnLights::at(drawn.free_position, k) != point.position;
+      }
+      const vec3 to_surface = surfaces[i].position - point.position;
+      const float d2 = length_squared(to_surface);
+      trace.clamped = glm::dot(to_surface, point.normal) > sampler.clamp * d2 * glm::sqrt(d2);
     }
-    const vec3 to_surface = surfaces[i].position - light.position;
-    const float d2 = length_squared(to_surface);
-    trace.clamped = glm::dot(to_surface, light.normal) > sampler.clamp * d2 * glm::sqrt(d2);
   }
 
   LUMI_HD void write(std::size_t i, const VplPoint& light, Lobes lobes) const {

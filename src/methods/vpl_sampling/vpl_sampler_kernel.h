@@ -17,7 +17,7 @@
 #pragma once
 
 #include "lights/alias_table.h"
-#include "methods/substitute_tree/substitute_walk_kernel.h"
+#include "methods/substitute_tree/substitute_draw_kernel.h"
 #include "trace/ray.h"
 
 namespace lumigrove {
@@ -116,6 +116,55 @@ LUMI_HD inline VplPoint vpl_of_walk(const VplSampler& sampler, const WalkResult&
   if (result.end == WalkEnd::kLeaf) return exact_vpl(tree.leaf(result.node), scale);
   const Distribution& d = tree.distributions[result.node];
   return {sample_distribution(d, result.box, u), d.normal, d.intensity * scale, 0, sampler.substitute_offset};
+}
+
+// --- many at once ------------------------------------------------------------------------------------------
+
+template <int L>
+struct LitLanes {
+  LaneVec3<L> radiance;  // as vpl_light of the diffuse lobe
+  LaneVec3<L> origin, direction;
+  Lanes<L> tmin, tmax;   // as vpl_shadow_ray; tmax -1 where there is no light
+};
+
+// vpl_light and vpl_shadow_ray for the diffuse lobes of a group of surfaces.
+template <int L>
+LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> light_diffuse_lobes(const VplSampler& sampler,
+                                                           const SubstituteWalkPoints& points, int first,
+                                                           const LightLanes<L>& light) {
+  const Lanes<L> zero = broadcast<L>(0), one = broadcast<L>(1), tiny = broadcast<L>(1e-30f);
+  const LaneVec3<L> x = load_vec3<L>(points.position, first), n = load_vec3<L>(points.normal, first),
+                    geometric = load_vec3<L>(points.geometric_normal, first),
+                    albedo = load_vec3<L>(points.diffuse, first);
+  const LaneVec3<L> to_light{light.position.x - x.x, light.position.y - x.y, light.position.z - x.z};
+  const Lanes<L> d2 = dot<L>(to_light, to_light), inverse = inverse_sqrt<L>(max_lanes<L>(d2, tiny));
+  const Lanes<L> inverse2 = inverse * inverse;
+  const Lanes<L> cos_light = dot<L>(to_light, light.normal) * (zero - inverse);
+  const Lanes<L> cos_surface = dot<L>(to_light, n) * inverse, cos_geometric = dot<L>(to_light, geometric);
+  // All must be positive; a light at the very place of the surface sends nothing.
+  const Lanes<L> least = min_lanes<L>(min_lanes<L>(cos_light, cos_surface),
+                                      min_lanes<L>(cos_geometric, min_lanes<L>(light.alive, d2 - tiny)));
+  const Lanes<L> bounded = min_lanes<L>(cos_light * inverse2, broadcast<L>(glm::min(sampler.clamp, 3e38f)));
+  const Lanes<L> geometry = choose_where_greater<L>(least, zero, bounded * cos_surface * kInvPi, zero);
+  LitLanes<L> lit;
+  lit.radiance = {light.intensity.x * albedo.x * geometry, light.intensity.y * albedo.y * geometry,
+                  light.intensity.z * albedo.z * geometry};
+
+  const Lanes<L> epsilon = load_lanes<L>(points.epsilon + first);
+  lit.origin = {multiply_add<L>(light.normal.x, light.epsilon, light.position.x),
+                multiply_add<L>(light.normal.y, light.epsilon, light.position.y),
+                multiply_add<L>(light.normal.z, light.epsilon, light.position.z)};
+  lit.direction = {multiply_add<L>(geometric.x, epsilon, x.x) - lit.origin.x,
+                   multiply_add<L>(geometric.y, epsilon, x.y) - lit.origin.y,
+                   multiply_add<L>(geometric.z, epsilon, x.z) - lit.origin.z};
+  const Lanes<L> length2 = dot<L>(lit.direction, lit.direction);
+  const Lanes<L> skip = light.substitute * (sampler.substitute_offset * inverse_sqrt<L>(max_lanes<L>(length2, tiny)));
+  lit.tmin = min_lanes<L>(skip, broadcast<L>(0.5f));
+  // Corrected samples may be negative.
+  const Lanes<L> strength = lit.radiance.x * lit.radiance.x + lit.radiance.y * lit.radiance.y +
+                            lit.radiance.z * lit.radiance.z;
+  lit.tmax = choose_where_greater<L>(strength, zero, one, zero - one);
+  return lit;
 }
 
 }  // namespace lumigrove
