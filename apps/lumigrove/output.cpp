@@ -18,8 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 void require_extension(const fs::path& file, const std::vector<std::string>& extensions) {
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = lower_extension(file);
   if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end())
     throw Error(fmt::format("output '{}' must end in one of {}", file.string(), fmt::join(extensions, ", ")));
 }
@@ -36,6 +35,12 @@ void require_creatable(const fs::path& file) {
 }  // namespace
 
 const std::vector<std::string> kImageExtensions = {".exr", ".png", ".jpg", ".jpeg"};
+
+std::string lower_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
 
 ToneMap OutputOptions::tone() const {
   return {exposure, curve == "srgb" ? ToneCurve::kSrgb : ToneCurve::kFilmic};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ struct OutputOptions {
 
 // -o, --exposure, --tone. The caller says whether -o is required.
 std::shared_ptr<OutputOptions> add_output_options(CLI::App& command);
+
+// ".png" of "A.PNG".
+std::string lower_extension(const std::filesystem::path& file);
 
 // Extensions that write_image knows.
 extern const std::vector<std::string> kImageExtensions;

@@ -47,7 +47,7 @@ ProgressStyle progress_style(const std::string& name) {
   if (name == "bar") return ProgressStyle::kBar;
   if (name == "plain") return ProgressStyle::kPlain;
   if (name == "json") return ProgressStyle::kJson;
-  if (name == "none") return ProgressStyle::kNone;
+  if (name == "none") return ProgressStyle::kSilent;
   throw Error(fmt::format("--progress is '{}', but must be auto, bar, plain, json or none", name));
 }
 
@@ -73,7 +73,7 @@ void ProgressPrinter::begin_frame(int frame) {
 }
 
 void ProgressPrinter::update(const Progress& progress) {
-  if (style_ == ProgressStyle::kNone) return;
+  if (style_ == ProgressStyle::kSilent) return;
   const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
   const double in_frame =
       progress.spp_total > 0 ? static_cast<double>(progress.spp_done) / progress.spp_total : 1;

@@ -10,7 +10,7 @@
 namespace lumigrove {
 
 enum class ProgressStyle {
-  kNone,
+  kSilent,
   kBar,    // one line, redrawn in place
   kPlain,  // a line every few seconds, and one at the end
   kJson,   // one JSON object a line

@@ -97,7 +97,7 @@ void render_tasks(const RenderOptions& options, const Scene& scene, std::vector<
   const InterruptGuard guard;
   RenderStats total;
   {
-    const ProgressStyle style = options.log->quiet ? ProgressStyle::kNone : progress_style(options.progress);
+    const ProgressStyle style = options.log->quiet ? ProgressStyle::kSilent : progress_style(options.progress);
     ProgressPrinter progress(style, static_cast<int>(tasks.size()));
     Receipt receipt = make_receipt(scene, options.scene->full_name());
     receipt.environment = options.scene->environment;

@@ -103,7 +103,7 @@ void run(const RerunOptions& options) {
   if (options.threads >= 0) settings.threads = options.threads;
   check(settings);
   const InterruptGuard guard;
-  const ProgressStyle style = options.log->quiet ? ProgressStyle::kNone : progress_style(options.progress);
+  const ProgressStyle style = options.log->quiet ? ProgressStyle::kSilent : progress_style(options.progress);
   ProgressPrinter progress(style, 1);
   const Image image = render_frame(scene, settings, now, progress, guard);
   progress.end_line();

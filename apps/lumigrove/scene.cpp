@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 
 #include "commands.h"
@@ -58,12 +57,6 @@ struct ExportOptions {
   int spp = 64;
   bool force_diffuse = false;
 };
-
-std::string lower_extension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
 
 // Number of the camera in node order; -1 when the scene has none.
 int camera_index(const Scene& scene, const SceneState& state, const std::string& name) {

@@ -90,6 +90,7 @@ void add_commands(CLI::App& app) {
   add_render_command(app);
   add_rerun_command(app);
   add_compare_command(app);
+  add_tree_command(app);
   add_scene_command(app);
   add_list_command(app);
 }

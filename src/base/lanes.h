@@ -24,10 +24,13 @@
 
 namespace lumigrove {
 
+#define LUMI_PRAGMA(text) _Pragma(#text)
 #if defined(__CUDACC__)
 #define LUMI_ALWAYS_INLINE __forceinline__
+#define LUMI_UNROLL(n) LUMI_PRAGMA(unroll n)
 #else
 #define LUMI_ALWAYS_INLINE [[gnu::always_inline]] inline
+#define LUMI_UNROLL(n) LUMI_PRAGMA(GCC unroll n)
 #endif
 
 // Starts loading a cache line that will be read soon. To be called from inlined functions only: GCC drops calls of a

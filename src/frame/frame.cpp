@@ -175,6 +175,8 @@ void add_gather_passes(RenderStats& stats, const GatherBuffers& gather) {
 
 // Shadow rays leave a substitute through this much of its surroundings, in units of D: it may lie inside geometry.
 constexpr float kSubstituteOffset = 2.2e-3f;
+// Distance that stands for none where kInBox leaves it out, in units of D.
+constexpr float kInsideDistance = 0.2155f;
 
 }  // namespace
 
@@ -262,6 +264,7 @@ IndirectLighting make_indirect_lighting(const World& world, const Settings& sett
   sampler.walk.tree = world.substitutes.view();
   sampler.walk.weight = s.weights;
   sampler.walk.floor2 = std::max(s.distance_floor * s.distance_floor, 1e-14f) * d * d;
+  sampler.walk.inside2 = kInsideDistance * kInsideDistance * d * d;
   sampler.walk.cones = s.cones;
   sampler.walk.substitutes = s.stop == Stop::kSubstitute;
   sampler.choice = s.selection == Selection::kRoot    ? VplChoice::kTree

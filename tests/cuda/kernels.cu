@@ -12,15 +12,22 @@
 #include "base/vec.h"
 #include "device/cuda/launch.h"
 #include "frame/emission_kernel.h"
+#include "frame/film.h"
 #include "lights/light_set.h"
+#include "lights/unoccluded_kernel.h"
 #include "lights/vpl.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/light_tree/light_tree_build_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
-#include "methods/vpl/vpl_kernel.h"
 #include "methods/substitute_tree/substitute_build_kernel.h"
+#include "methods/substitute_tree/substitute_draw_kernel.h"
+#include "methods/substitute_tree/substitute_walk_kernel.h"
+#include "methods/vpl/vpl_kernel.h"
+#include "methods/vpl_sampling/gather_kernel.h"
+#include "methods/vpl_sampling/indirect_lighting_kernel.h"
+#include "methods/vpl_sampling/vpl_sampler_kernel.h"
 #include "scene/bsdf.h"
 #include "scene/camera_kernel.h"
 #include "scene/scene_view.h"
@@ -108,5 +115,11 @@ template void cuda::launch<SubstituteKeyKernel>(int, const SubstituteKeyKernel&,
 template void cuda::launch<SubstituteMortonKernel>(int, const SubstituteMortonKernel&, cudaStream_t);
 template void cuda::launch<SubstitutePrefixKernel>(int, const SubstitutePrefixKernel&, cudaStream_t);
 template void cuda::launch<SubstituteMergeKernel>(int, const SubstituteMergeKernel&, cudaStream_t);
+template void cuda::launch<IndirectLightKernel>(int, const IndirectLightKernel&, cudaStream_t);
+template void cuda::launch<GatherScatterKernel>(int, const GatherScatterKernel&, cudaStream_t);
+template void cuda::launch<GatherArriveKernel>(int, const GatherArriveKernel&, cudaStream_t);
+template void cuda::launch<GatherCarryKernel>(int, const GatherCarryKernel&, cudaStream_t);
+template void cuda::launch<FilmKernel>(int, const FilmKernel&, cudaStream_t);
+template void cuda::launch<WalkFilmKernel>(int, const WalkFilmKernel&, cudaStream_t);
 
 }  // namespace lumigrove

@@ -26,9 +26,9 @@ LUMI_HD LUMI_ALWAYS_INLINE void load_ends(const SubstituteWalk& walk, const Subs
   constexpr int kVplWords = sizeof(Vpl) / sizeof(float), kDistributionWords = sizeof(Distribution) / sizeof(float);
   static_assert(kDistributionWords == 16);
   const SubstituteTreeView& tree = walk.tree;
-#pragma GCC unroll 2
+  LUMI_UNROLL(2)
   for (int part = 0; part < kDistributionWords; part += L) {
-#pragma GCC unroll 16
+    LUMI_UNROLL(16)
     for (int i = 0; i < L; ++i) {
       const WalkEnd end = end_of_walk(state, first + i);
       const bool leaf = end != WalkEnd::kSubstitute;

@@ -14,6 +14,8 @@
 //             relative margin of 2e-6, so that rounding never makes a light at the horizon impossible.
 //             The gloss lobe is floored by its own tail, never 0, so that no box above the horizon is a dead branch.
 //             With `cones`, weights also bound the cosine at the lights (paper: none).
+//             Where stochastic lightcuts' baseline leaves the distance out (kInBox) it is one unit of the demos, whose
+//             scenes measure some 4.64: leaving it out would make probabilities depend on the unit of length.
 //             Random numbers are not re-stretched for more than kStepsPerNumber steps.
 // Estimator   The walk itself is exact: every light that can contribute at x has positive probability, and the
 //             probability returned is that of the steps taken. Drawing from substitutes is biased: they are not where
@@ -37,6 +39,7 @@ struct SubstituteWalk {
   float floor2 = 0;        // epsilon^2, m^2: least squared distance
   bool cones = false;      // bound the cosine at the lights
   bool substitutes = true; // stop at usable nodes
+  float inside2 = 1;       // m^2: squared distance that kInBox takes where x lies in the box
 };
 
 #if defined(__CUDACC__)
@@ -137,9 +140,9 @@ inline constexpr int kNodeWords = sizeof(SubstituteNode) / sizeof(float);
 template <int L>
 LUMI_HD LUMI_ALWAYS_INLINE void load_nodes(const SubstituteNode* nodes, const std::uint32_t* index,
                                            Lanes<L> (&words)[kNodeWords]) {
-#pragma GCC unroll 2
+  LUMI_UNROLL(2)
   for (int part = 0; part < kNodeWords; part += L) {
-#pragma GCC unroll 16
+    LUMI_UNROLL(16)
     for (int i = 0; i < L; ++i)
       words[part + i] = load_lanes<L>(reinterpret_cast<const float*>(nodes + index[i]) + part);
     transpose_lanes<L>(words + part);
@@ -240,7 +243,7 @@ LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> direction_in_box(const LaneVec3<L>& r, co
       const Lanes<L> cosine = dot<L>(p, r) * scale;
       // Behind the surface's mirror direction, or without a direction: no candidate.
       const Lanes<L> valid = min_lanes<L>(min_lanes<L>(usable, t), length2);
-      const Lanes<L> better = choose_where_greater<L>(valid, zero, cosine - best_cosine, broadcast<L>(-1));
+      const Lanes<L> better = choose_where_greater<L>(cosine, best_cosine, valid, zero);
       best_cosine = choose_where_greater<L>(better, zero, cosine, best_cosine);
       best.x = choose_where_greater<L>(better, zero, p.x * scale, best.x);
       best.y = choose_where_greater<L>(better, zero, p.y * scale, best.y);
@@ -261,7 +264,8 @@ LUMI_HD LUMI_ALWAYS_INLINE Lanes<L> gloss_towards(const WalkLanes<L>& walks, con
   const LaneVec3<L> h{w.x + walks.wo.x, w.y + walks.wo.y, w.z + walks.wo.z};
   const Lanes<L> n_h = dot<L>(walks.normal, h), h2 = dot<L>(h, h);
   // As ggx_normal_density; |h - n (n h)|^2 = h2 - n_h^2 is good enough for a weight.
-  const Lanes<L> q = multiply_add<L>(walks.alpha2, n_h * n_h, max_lanes<L>(h2 - n_h * n_h, zero));
+  const Lanes<L> aside2 = max_lanes<L>(multiply_add<L>(zero - n_h, n_h, h2), zero);
+  const Lanes<L> q = multiply_add<L>(walks.alpha2, n_h * n_h, aside2);
   const Lanes<L> density = walks.alpha2 * (h2 * h2) / max_lanes<L>(q * q, broadcast<L>(1e-30f));
   const Lanes<L> k = walks.alpha2 * 0.5f;
   const Lanes<L> cosine = max_lanes<L>(dot<L>(walks.normal, w), zero);
@@ -342,8 +346,9 @@ LUMI_HD LUMI_ALWAYS_INLINE PairWeights<L> weigh_children(const SubstituteWalk& w
     return {a.shine * max_lanes<L>(b.mean2, floor2), b.shine * max_lanes<L>(a.mean2, floor2)};
   Lanes<L> divide_a, divide_b;
   if (walk.weight == IndirectWeights::kInBox) {
-    divide_a = choose_where_greater<L>(a.near2, zero, max_lanes<L>(a.mean2, floor2), one);
-    divide_b = choose_where_greater<L>(b.near2, zero, max_lanes<L>(b.mean2, floor2), one);
+    const Lanes<L> inside2 = broadcast<L>(walk.inside2);
+    divide_a = choose_where_greater<L>(a.near2, zero, max_lanes<L>(a.mean2, floor2), inside2);
+    divide_b = choose_where_greater<L>(b.near2, zero, max_lanes<L>(b.mean2, floor2), inside2);
   } else {
     // Either child's box is wider than far away: distances would say nothing. Two lights have no width.
     const Lanes<L> too_near = max_lanes<L>(a.diagonal2 - a.near2, b.diagonal2 - b.near2);
