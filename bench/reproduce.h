@@ -30,9 +30,9 @@ struct Relation {
   std::string what;       // the quantity
   std::string published;  // in the paper's words or numbers; empty: not published
   double ours = 0;
-  double error = 0;       // standard error of `ours`; 0: exact, or not known
+  double error = 0;                                   // standard error of `ours`; 0: exact, or not known
   std::optional<double> at_least = {}, at_most = {};  // neither: a number to be read
-  std::string note = {};  // the numbers behind it
+  std::string note = {};                              // the numbers behind it
 
   Verdict verdict() const {
     if (!at_least && !at_most) return Verdict::kReported;

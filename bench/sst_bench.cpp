@@ -28,9 +28,7 @@ class FloorPart {
     bare_.trace_occluded(occluded_mode_);
   }
   std::size_t count() const { return bare_.closest_count() + bare_.occluded_count(); }
-  std::string mode() const {
-    return BareEmbree::mode_name(bare_.closest_count() > 0 ? closest_mode_ : occluded_mode_);
-  }
+  std::string mode() const { return BareEmbree::mode_name(bare_.closest_count() > 0 ? closest_mode_ : occluded_mode_); }
 
  private:
   BareEmbree bare_;
@@ -69,7 +67,8 @@ FrameRays record_frame(Study& study, const Settings& settings) {
 }
 
 void add_passes(const RenderStats& stats, double frames, Result& result) {
-  const double thread_ns = 1e6 * std::max(1, tbb::this_task_arena::max_concurrency()) / frames / (kTimeWidth * kTimeHeight);
+  const double thread_ns =
+      1e6 * std::max(1, tbb::this_task_arena::max_concurrency()) / frames / (kTimeWidth * kTimeHeight);
   for (const PassStats& pass : stats.passes)
     result.details.emplace_back(pass.name + ", thread-ns per pixel", pass.ms * thread_ns);
 }
@@ -130,7 +129,10 @@ struct GrowthStudy {
   Study few_study, many_study;
 
   GrowthStudy(const char* scene, Settings settings)
-      : few(with_vpls(settings, 10000)), many(with_vpls(settings, 1000000)), few_study(scene, few), many_study(scene, many) {
+      : few(with_vpls(settings, 10000)),
+        many(with_vpls(settings, 1000000)),
+        few_study(scene, few),
+        many_study(scene, many) {
     few_study.trace(few);
     many_study.trace(many);
   }
@@ -244,7 +246,8 @@ Result memory_per_vpl(const Options&) {
     result.value = std::max(result.value, bytes / vpls);
     result.details.emplace_back(std::string(scene) + ": VPLs", vpls);
     result.details.emplace_back(std::string(scene) + ": bytes per VPL", bytes / vpls);
-    result.details.emplace_back(std::string(scene) + ": with the buffers of the tree's build", (bytes + scratch) / vpls);
+    result.details.emplace_back(std::string(scene) + ": with the buffers of the tree's build",
+                                (bytes + scratch) / vpls);
   }
   return result;
 }

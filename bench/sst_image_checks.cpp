@@ -120,12 +120,33 @@ void report_errors(const PeerRow& row, const ImageErrors& sst, const ImageErrors
   const std::string where = fmt::format("{}, {} spp", row.diffuse ? "diffuse" : "glossy", spp);
   const Estimate ratio = rmse_ratio(sst.squared, slc.squared), ssim = mean_difference(sst.ssim, slc.ssim);
   const Estimate indirect = rmse_ratio(sst.squared_indirect, slc.squared_indirect);
-  report({6, row.scene, "RMSE sst / slc, " + where, fmt::format("{:.2f}", row.sst_rmse / row.slc_rmse), ratio.value,
-          ratio.error, {}, 1, rmse_note(sst.squared, slc.squared, reference.beauty_variance)});
-  report({6, row.scene, "the same, indirect light alone", "", indirect.value, indirect.error, {}, 1,
+  report({6,
+          row.scene,
+          "RMSE sst / slc, " + where,
+          fmt::format("{:.2f}", row.sst_rmse / row.slc_rmse),
+          ratio.value,
+          ratio.error,
+          {},
+          1,
+          rmse_note(sst.squared, slc.squared, reference.beauty_variance)});
+  report({6,
+          row.scene,
+          "the same, indirect light alone",
+          "",
+          indirect.value,
+          indirect.error,
+          {},
+          1,
           rmse_note(sst.squared_indirect, slc.squared_indirect, reference.indirect_variance)});
-  report({6, row.scene, "SSIM sst - slc, " + where, fmt::format("{:+.3f}", row.sst_ssim - row.slc_ssim), ssim.value,
-          ssim.error, 0, {}, fmt::format("SSIM {:.4f} and {:.4f}", mean_of(sst.ssim).value, mean_of(slc.ssim).value)});
+  report({6,
+          row.scene,
+          "SSIM sst - slc, " + where,
+          fmt::format("{:+.3f}", row.sst_ssim - row.slc_ssim),
+          ssim.value,
+          ssim.error,
+          0,
+          {},
+          fmt::format("SSIM {:.4f} and {:.4f}", mean_of(sst.ssim).value, mean_of(slc.ssim).value)});
 }
 
 void report_peer_errors(const PeerRow& row, const Report& report) {
@@ -143,9 +164,8 @@ struct GrowthRow {
   double sst_ms[4], slc_ms[4];  // published
 };
 constexpr int kGrowthVpls[] = {10000, 100000, 500000, 1000000};
-constexpr GrowthRow kGrowthRows[] = {
-    {"colonnade", {2.77, 3.36, 3.78, 3.92}, {2.74, 4.54, 6.12, 7.00}},
-    {"living-room", {2.27, 2.88, 3.36, 3.73}, {2.17, 4.34, 6.63, 8.04}}};
+constexpr GrowthRow kGrowthRows[] = {{"colonnade", {2.77, 3.36, 3.78, 3.92}, {2.74, 4.54, 6.12, 7.00}},
+                                     {"living-room", {2.27, 2.88, 3.36, 3.73}, {2.17, 4.34, 6.63, 8.04}}};
 constexpr double kTie = 0.12;  // how far from 1 a ratio counts as a tie
 
 struct SamplingTimes {
@@ -154,7 +174,8 @@ struct SamplingTimes {
 };
 
 SamplingTimes sampling_times(const char* scene, int vpls) {
-  Settings sst = sized(sst_settings(true), kTimeWidth, kTimeHeight), slc = sized(slc_settings(true), kTimeWidth, kTimeHeight);
+  Settings sst = sized(sst_settings(true), kTimeWidth, kTimeHeight),
+           slc = sized(slc_settings(true), kTimeWidth, kTimeHeight);
   sst.indirect.vpls = slc.indirect.vpls = vpls;
   Study study(scene, sst);
   study.trace(sst);
@@ -183,10 +204,22 @@ void report_times(const GrowthRow& row, const Report& report) {
   }
   report({6, row.scene, "that ratio, 1 M / 10 k VPLs", "above 1", ratios.back() / ratios.front(), 0, 1, {}});
   const double sst = row.sst_ms[3] / row.sst_ms[0], slc = row.slc_ms[3] / row.slc_ms[0];
-  report({6, row.scene, "sampling time of sst, 1 M / 10 k VPLs", fmt::format("{:.1f}", sst),
-          times.back().sst_ms / times.front().sst_ms, 0, {}, sst});
-  report({6, row.scene, "sampling time of slc, 1 M / 10 k VPLs", fmt::format("{:.1f}", slc),
-          times.back().slc_ms / times.front().slc_ms, 0, {}, slc});
+  report({6,
+          row.scene,
+          "sampling time of sst, 1 M / 10 k VPLs",
+          fmt::format("{:.1f}", sst),
+          times.back().sst_ms / times.front().sst_ms,
+          0,
+          {},
+          sst});
+  report({6,
+          row.scene,
+          "sampling time of slc, 1 M / 10 k VPLs",
+          fmt::format("{:.1f}", slc),
+          times.back().slc_ms / times.front().slc_ms,
+          0,
+          {},
+          slc});
 }
 
 void report_steps(const char* scene, const Report& report) {
@@ -198,8 +231,14 @@ void report_steps(const char* scene, const Report& report) {
     return trace_walks(make_indirect_lighting(*study.world, method, 0), seen);
   };
   const std::vector<VplTrace> sst = walks(settings), slc = walks(sized(slc_settings(true), kErrorWidth, kErrorHeight));
-  report({6, scene, "mean steps of a walk, sst / slc, 100 k VPLs", "15/20 = 0.75", mean_steps(sst) / mean_steps(slc), 0,
-          {}, 15.0 / 20,
+  report({6,
+          scene,
+          "mean steps of a walk, sst / slc, 100 k VPLs",
+          "15/20 = 0.75",
+          mean_steps(sst) / mean_steps(slc),
+          0,
+          {},
+          15.0 / 20,
           fmt::format("{:.2f} and {:.2f}; of the longest of {} walks side by side {:.2f} and {:.2f}", mean_steps(sst),
                       mean_steps(slc), kWalkLanes, mean_longest_steps(sst), mean_longest_steps(slc))});
 }
@@ -217,15 +256,19 @@ constexpr PathRow kPathRows[] = {{"colonnade", 17, 3.36, {29, 15, 12}, {2.75, 5.
 Relation path_error(const PathRow& row, int bounces, int spp, const ImageErrors& path, const ImageErrors& sst,
                     const Reference& reference) {
   const Estimate ratio = rmse_ratio(path.squared, sst.squared);
-  Relation relation{7, row.scene, fmt::format("RMSE path, {} bounce{} / sst, {} spp", bounces, bounces > 1 ? "s" : "", spp),
-                    fmt::format("{:.2f}", row.rmse[bounces - 1] / row.sst_rmse), ratio.value, ratio.error};
+  Relation relation{7,
+                    row.scene,
+                    fmt::format("RMSE path, {} bounce{} / sst, {} spp", bounces, bounces > 1 ? "s" : "", spp),
+                    fmt::format("{:.2f}", row.rmse[bounces - 1] / row.sst_rmse),
+                    ratio.value,
+                    ratio.error};
   if (bounces == 1) relation.at_least = 1;
   if (bounces == 3) relation.at_most = 1;
   const Estimate indirect = rmse_ratio(path.squared_indirect, sst.squared_indirect);
-  relation.note = fmt::format("{}; of indirect light alone {:.4g} and {:.4g}, ratio {:.3f} +- {:.3f}",
-                              rmse_note(path.squared, sst.squared, reference.beauty_variance),
-                              rmse_of(path.squared_indirect).value, rmse_of(sst.squared_indirect).value,
-                              indirect.value, indirect.error);
+  relation.note =
+      fmt::format("{}; of indirect light alone {:.4g} and {:.4g}, ratio {:.3f} +- {:.3f}",
+                  rmse_note(path.squared, sst.squared, reference.beauty_variance), rmse_of(path.squared_indirect).value,
+                  rmse_of(sst.squared_indirect).value, indirect.value, indirect.error);
   return relation;
 }
 
@@ -254,7 +297,8 @@ void report_path_times(const PathRow& row, const Report& report) {
     }
   }
   for (int k = 0; k < 3; ++k) {
-    Relation relation{7, row.scene, fmt::format("time of indirect light, path, {} bounce{} / sst", k + 1, k > 0 ? "s" : ""),
+    Relation relation{7, row.scene,
+                      fmt::format("time of indirect light, path, {} bounce{} / sst", k + 1, k > 0 ? "s" : ""),
                       fmt::format("{:.2f}", row.ms[k] / row.sst_ms), median(path_sampling[k]) / median(sampling)};
     if (k == 2) relation.at_least = 1;
     relation.note = fmt::format("{:.1f} ms and {:.1f} ms; whole frames {:.1f} ms and {:.1f} ms (ratio {:.2f})",

@@ -14,9 +14,9 @@ namespace {
 // --- 3: selection at fixed lights ------------------------------------------------------------------------------
 
 constexpr int kSurfacesWidth = 96, kSurfacesHeight = 54;
-constexpr int kFewVpls = 4000;   // so few that all of them can be summed
+constexpr int kFewVpls = 4000;  // so few that all of them can be summed
 constexpr int kBatches = 64, kBatchSpp = 32;
-constexpr int kBlocks = 6;       // along each side of the image
+constexpr int kBlocks = 6;  // along each side of the image
 
 double luminance_of(vec3 light) { return static_cast<double>(luminance(light)); }
 
@@ -105,7 +105,10 @@ constexpr Bounds kSigmaRows[] = {{0.5f, 0.5f}, {0.5f, 2}, {0.5f, 4}};
 class SelectionCheck {
  public:
   SelectionCheck(const char* scene, const Report& report)
-      : name_(scene), report_(report), settings_(make_settings()), study_(scene, settings_),
+      : name_(scene),
+        report_(report),
+        settings_(make_settings()),
+        study_(scene, settings_),
         seen_(*study_.world, settings_) {
     study_.trace(settings_);
     Settings all = settings_;
@@ -121,12 +124,19 @@ class SelectionCheck {
     const double exact = mean_luminance(exact_);
     const Estimate rms = root_above_noise(
         common_square(difference(leaves_.half[0], exact_), difference(leaves_.half[1], exact_), exact));
-    const std::string note = fmt::format("{} VPLs, {}x{} surfaces, {} samples each; RMS bias {:.2g} +- {:.1g} of mean light",
-                                         study_.world->vpls.view().vpls.size(), seen_.width, seen_.height,
-                                         kBatches * kBatchSpp, rms.value, rms.error);
-    report_({3, name_, "leaves only: mean / sum over all VPLs", "1", mean.value / exact, mean.error / exact, 1, 1, note});
-    report_({3, name_, "leaves only: worst |z| of 36 parts of the image", "", worst_z(leaves_, block_means(exact_, seen_)),
-             0, {}, 4});
+    const std::string note = fmt::format(
+        "{} VPLs, {}x{} surfaces, {} samples each; RMS bias {:.2g} +- {:.1g} of mean light",
+        study_.world->vpls.view().vpls.size(), seen_.width, seen_.height, kBatches * kBatchSpp, rms.value, rms.error);
+    report_(
+        {3, name_, "leaves only: mean / sum over all VPLs", "1", mean.value / exact, mean.error / exact, 1, 1, note});
+    report_({3,
+             name_,
+             "leaves only: worst |z| of 36 parts of the image",
+             "",
+             worst_z(leaves_, block_means(exact_, seen_)),
+             0,
+             {},
+             4});
   }
 
   // After leaves().
@@ -155,9 +165,16 @@ class SelectionCheck {
                                           difference(sampled.half[1], leaves_.half[1]), exact);
     for (std::size_t i = 0; i < sampled.images.size(); ++i) sampled.images[i] -= leaves_.images[i];
     const Estimate rms = root_above_noise(square), mean = mean_of(sampled.images);
-    report_({3, name_, fmt::format("RMS bias / mean light: nu_min {}, sigma_max {}x", bounds.min_nu, bounds.sigma_scale),
-             "small", rms.value, rms.error, {}, {},
-             fmt::format("mean {:+.2f} +- {:.2f} %; {}", 100 * mean.value / exact, 100 * mean.error / exact, walks_text())});
+    report_({3,
+             name_,
+             fmt::format("RMS bias / mean light: nu_min {}, sigma_max {}x", bounds.min_nu, bounds.sigma_scale),
+             "small",
+             rms.value,
+             rms.error,
+             {},
+             {},
+             fmt::format("mean {:+.2f} +- {:.2f} %; {}", 100 * mean.value / exact, 100 * mean.error / exact,
+                         walks_text())});
     return square;
   }
 
@@ -209,7 +226,14 @@ void report_default_bias(const char* scene, const Report& report) {
   }
   const double light = mean_of(exact).value;
   const Estimate rms = root_above_noise(common_square(bias[0], bias[1], light)), mean = mean_of(differences);
-  report({3, scene, "RMS bias / mean light: defaults, many sets of 100 k VPLs", "small", rms.value, rms.error, {}, {},
+  report({3,
+          scene,
+          "RMS bias / mean light: defaults, many sets of 100 k VPLs",
+          "small",
+          rms.value,
+          rms.error,
+          {},
+          {},
           fmt::format("mean {:+.2f} +- {:.2f} %", 100 * mean.value / light, 100 * mean.error / light)});
 }
 
@@ -305,9 +329,16 @@ void report_depth(int check, const std::string& scene_name, const std::string& s
   const DepthMeans means = measure_depth(scene, bounces);
   const Estimate clamped = ratio_of(means.clamped.estimate(), means.paths.estimate());
   const Estimate free = ratio_of(means.free.estimate(), means.paths.estimate());
-  report({check, scene_name, fmt::format("{}: VPLs / paths, mean, clamped", subject), "below 1", clamped.value,
-          clamped.error, {}, 1});
-  report({check, scene_name, fmt::format("{}: VPLs / paths, mean, no clamp", subject), "1", free.value, free.error, 1, 1});
+  report({check,
+          scene_name,
+          fmt::format("{}: VPLs / paths, mean, clamped", subject),
+          "below 1",
+          clamped.value,
+          clamped.error,
+          {},
+          1});
+  report(
+      {check, scene_name, fmt::format("{}: VPLs / paths, mean, no clamp", subject), "1", free.value, free.error, 1, 1});
 }
 
 // --- 9: weights ------------------------------------------------------------------------------------------------
@@ -349,12 +380,26 @@ void check_energy(const Report& report) {
   LightType point = LightType::kPoint;
   const Scene with_point = closed_box(kAlbedo, kAlbedo, kAlbedo, &point);
   const Scene with_lamp = closed_box(kAlbedo, kAlbedo, kAlbedo, nullptr);
-  report({4, "box", "flux of a bounce / albedo of the one before - 1, point light", "0",
-          worst_deviation(bounce_ratios(with_point), double(kAlbedo)), 0, {}, 1e-3, "worst of 3 bounces"});
-  report({4, "box", "the same, area light", "0", worst_deviation(bounce_ratios(with_lamp), double(kAlbedo)), 0, {}, 1e-3});
+  report({4,
+          "box",
+          "flux of a bounce / albedo of the one before - 1, point light",
+          "0",
+          worst_deviation(bounce_ratios(with_point), double(kAlbedo)),
+          0,
+          {},
+          1e-3,
+          "worst of 3 bounces"});
+  report(
+      {4, "box", "the same, area light", "0", worst_deviation(bounce_ratios(with_lamp), double(kAlbedo)), 0, {}, 1e-3});
   const double mean = (2 * double(kDark) + double(kBright)) / 3;
-  report({4, "box", "the same, unequal walls, over their mean albedo", "0",
-          worst_deviation(bounce_ratios(closed_box(kDark, kBright, kDark, &point)), mean), 0, {}, 0.1,
+  report({4,
+          "box",
+          "the same, unequal walls, over their mean albedo",
+          "0",
+          worst_deviation(bounce_ratios(closed_box(kDark, kBright, kDark, &point)), mean),
+          0,
+          {},
+          0.1,
           "albedo 0.2, 0.8, 0.2 of x, y, z walls"});
   report_depth(4, "box", "point light, 3 bounces", with_point, 3, report);
   report_depth(4, "box", "area light, 3 bounces", with_lamp, 3, report);
@@ -376,8 +421,16 @@ void check_weights(const Report& report) {
     const std::vector<double> bounded = variances(study, seen, settings, IndirectWeights::kDistanceBounded);
     const Estimate in_box = ratio_of_means(variances(study, seen, settings, IndirectWeights::kInBox), bounded);
     const Estimate yuksel = ratio_of_means(variances(study, seen, settings, IndirectWeights::kYuksel), bounded);
-    report({9, scene, "variance to leaves: in-box rule / distance-bounded", "above 1", in_box.value, in_box.error, 1, {}});
-    report({9, scene, "variance to leaves: Yuksel's rule / distance-bounded", "above 1", yuksel.value, yuksel.error, 1, {}});
+    report(
+        {9, scene, "variance to leaves: in-box rule / distance-bounded", "above 1", in_box.value, in_box.error, 1, {}});
+    report({9,
+            scene,
+            "variance to leaves: Yuksel's rule / distance-bounded",
+            "above 1",
+            yuksel.value,
+            yuksel.error,
+            1,
+            {}});
   }
 }
 

@@ -165,8 +165,14 @@ void report_substitutes(const Report& report) {
     worst = std::max(worst, std::abs(double(root.variance_along(axis)) / variance_of(flat, axis) - 1));
   report({2, "", "flat lights: sigma_xy^2 / population variance - 1, worst", "0", worst, 0, {}, 1e-4});
   const LightsAndTree corner = corner_lights();
-  report({2, "", "two perpendicular walls: root may stand for all", "0",
-          corner.tree.view().root_usable ? 1.0 : 0.0, 0, {}, 0});
+  report({2,
+          "",
+          "two perpendicular walls: root may stand for all",
+          "0",
+          corner.tree.view().root_usable ? 1.0 : 0.0,
+          0,
+          {},
+          0});
 }
 
 // --- 8: build ------------------------------------------------------------------------------------------------
@@ -181,8 +187,8 @@ BuildTime build_time(const char* scene, int vpls) {
   settings.indirect.vpls = vpls;
   Study study(scene, settings);
   study.trace(settings);
-  const double ms = median_ms(
-      kRuns, [&] { study.build_substitutes(settings.indirect.min_nu, settings.indirect.max_sigma); });
+  const double ms =
+      median_ms(kRuns, [&] { study.build_substitutes(settings.indirect.min_nu, settings.indirect.max_sigma); });
   return {ms, static_cast<double>(study.world->substitutes.view().count)};
 }
 
@@ -202,14 +208,27 @@ void check_build(const Report& report) {
     std::vector<BuildTime> times;
     for (std::size_t i = 0; i < std::size(kVpls); ++i) {
       times.push_back(build_time(scene, kVpls[i]));
-      report({8, scene, fmt::format("tree build, at most {} VPLs: ms", kVpls[i]), kPublishedMs[i], times[i].ms, 0, {}, {},
+      report({8,
+              scene,
+              fmt::format("tree build, at most {} VPLs: ms", kVpls[i]),
+              kPublishedMs[i],
+              times[i].ms,
+              0,
+              {},
+              {},
               fmt::format("{} VPLs, {:.3g} ns each", times[i].lights, times[i].ms * 1e6 / times[i].lights)});
     }
     hundred_k_ns.push_back(times[1].ms / times[1].lights);
     report({8, scene, "time of a build of 1 M / of 100 k", "4.9", times[3].ms / times[1].ms, 0, {}, 10});
   }
-  report({8, "", "time a VPL at 100 k: slower scene / faster", "1.0",
-          std::ranges::max(hundred_k_ns) / std::ranges::min(hundred_k_ns), 0, {}, 1.25});
+  report({8,
+          "",
+          "time a VPL at 100 k: slower scene / faster",
+          "1.0",
+          std::ranges::max(hundred_k_ns) / std::ranges::min(hundred_k_ns),
+          0,
+          {},
+          1.25});
 }
 
 }  // namespace lumigrove::bench
