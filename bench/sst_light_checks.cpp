@@ -290,10 +290,10 @@ double worst_deviation(const std::vector<double>& ratios, double expected) {
 
 // Without a clamp single samples are arbitrarily bright, though rarely: many are needed. Few lights do: the mean does not
 // depend on their number.
-constexpr int kDepthSets = 64, kDepthSpp = 4, kDepthVpls = 30000;
+constexpr int kDepthSets = 64, kDepthSpp = 4, kDepthVpls = 30000, kDepthPaths = 6;
 
 struct DepthMeans {
-  Mean paths, clamped, free;  // of the indirect light of an image, one a set of VPLs
+  Mean paths, clamped, free;  // of the indirect light of an image, one an image
 };
 
 // Leaves only against paths of as many bounces.
@@ -310,9 +310,12 @@ DepthMeans measure_depth(const Scene& scene, int bounces) {
   Study path_study(scene, paths), vpl_study(scene, clamped);
   DepthMeans means;
   for (int set = 0; set < kDepthSets; ++set) {
-    paths.seed = clamped.seed = free.seed = static_cast<std::uint32_t>(set) + 1;
+    clamped.seed = free.seed = static_cast<std::uint32_t>(set) + 1;
     vpl_study.trace(clamped);
-    means.paths.add(mean_value(render_one(path_study, paths).indirect));
+    for (int k = 0; k < kDepthPaths; ++k) {
+      ++paths.seed;
+      means.paths.add(mean_value(render_one(path_study, paths).indirect));
+    }
     means.clamped.add(mean_value(render_one(vpl_study, clamped).indirect));
     means.free.add(mean_value(render_one(vpl_study, free).indirect));
   }
