@@ -75,8 +75,8 @@ void add_passes(const RenderStats& stats, double frames, Result& result) {
 
 // Every frame traces its virtual point lights and builds their tree. The acceleration structure is left out on both
 // sides: the floor replays rays through a finished one.
-Result frame_over_floor(const char* scene_name, const Options& options) {
-  const Settings settings = sized(sst_settings(false), kTimeWidth, kTimeHeight);
+Result frame_over_floor(const char* scene_name, bool diffuse, const Options& options) {
+  const Settings settings = sized(sst_settings(diffuse), kTimeWidth, kTimeHeight);
   Study study(scene_name, settings);
   const FrameRays rays = record_frame(study, settings);
   const FloorPart paths(study, rays.paths.closest, {}), camera(study, rays.direct.closest, {}),
@@ -118,6 +118,17 @@ Result frame_over_floor(const char* scene_name, const Options& options) {
   add_floor("VPL shadow rays", indirect);
   result.details.emplace_back("substitute tree, ms", tree_ms / frames);
   add_passes(stats, frames, result);
+  return result;
+}
+
+// The preset lights gloss too, by walks of its own; the same without, beside it.
+Result frames_over_floor(const char* scene_name, const Options& options) {
+  Result result = frame_over_floor(scene_name, false, options);
+  const Result diffuse = frame_over_floor(scene_name, true, options);
+  result.details.emplace_back("all surfaces diffuse: ratio", diffuse.value);
+  for (const auto& [name, value] : diffuse.details)
+    if (name.find("VPL selection") != name.npos || name == "frame_ms" || name == "floor_ms")
+      result.details.emplace_back("all surfaces diffuse: " + name, value);
   return result;
 }
 
@@ -168,7 +179,7 @@ Result sampling_growth(const Settings& settings, const Options& options) {
 // --- error at equal time -----------------------------------------------------------------------------------------
 
 constexpr int kSstSpp = 8;
-constexpr int kReferenceSpp = 1024;
+constexpr int kReferenceSpp = 512;
 constexpr std::uint32_t kSeeds = 12;
 
 // A method in one scene: whole frames at full size are timed, small ones compared.
@@ -184,6 +195,17 @@ struct Contestant {
     RenderStats stats;
     Film film(full.width, full.height);
     render_sample(*study.world, full, 0, film, stats);
+  }
+
+  // At a fraction of a sample: noise falls with its inverse, in which it is interpolated between whole ones.
+  std::vector<double> squared_errors_at(const Reference& reference, double spp) {
+    const int below = std::max(1, static_cast<int>(spp)), above = below + 1;
+    std::vector<double> errors = squared_errors(reference, below);
+    const double share = (1 / spp - 1.0 / below) / (1.0 / above - 1.0 / below);
+    if (!(share > 0)) return errors;
+    const std::vector<double> better = squared_errors(reference, above);
+    for (std::size_t i = 0; i < errors.size(); ++i) errors[i] += (better[i] - errors[i]) * share;
+    return errors;
   }
 
   std::vector<double> squared_errors(const Reference& reference, int spp) {
@@ -207,10 +229,10 @@ Result error_against(const char* name, const Settings& other_settings, const Opt
   Contestant sst(scene, sst_settings(true)), other(scene, other_settings);
   const PairTimes times = time_in_turns(
       options.runs, [&] { sst.frame(); }, [&] { other.frame(); });
-  // As many samples as the other affords in the time of sst, to the nearest whole one.
-  const int other_spp = std::max(1, static_cast<int>(std::lround(kSstSpp * times.ratio)));
+  const double other_spp = std::max(1.0, kSstSpp * times.ratio);
   const Reference reference = make_reference(scene, true, kReferenceSpp);
-  const std::vector<double> a = sst.squared_errors(reference, kSstSpp), b = other.squared_errors(reference, other_spp);
+  const std::vector<double> a = sst.squared_errors(reference, kSstSpp);
+  const std::vector<double> b = other.squared_errors_at(reference, other_spp);
   const Estimate ratio = root(ratio_of_means(a, b));
   const auto rmse_of = [](const std::vector<double>& squared) {
     Mean mean;
@@ -220,7 +242,7 @@ Result error_against(const char* name, const Settings& other_settings, const Opt
   return {ratio.value,
           {{"standard error", ratio.error},
            {"sst samples a pixel", kSstSpp},
-           {std::string(name) + " samples a pixel in the same time", static_cast<double>(other_spp)},
+           {std::string(name) + " samples a pixel in the same time", other_spp},
            {std::string("time of a frame of sst / of ") + name, times.ratio},
            {"sst frame_ms", times.a_ms},
            {std::string(name) + " frame_ms", times.b_ms},
@@ -231,8 +253,8 @@ Result error_against(const char* name, const Settings& other_settings, const Opt
 
 }  // namespace
 
-Result frame_floor_sst_colonnade(const Options& options) { return frame_over_floor("colonnade", options); }
-Result frame_floor_sst_living_room(const Options& options) { return frame_over_floor("living-room", options); }
+Result frame_floor_sst_colonnade(const Options& options) { return frames_over_floor("colonnade", options); }
+Result frame_floor_sst_living_room(const Options& options) { return frames_over_floor("living-room", options); }
 
 Result memory_per_vpl(const Options&) {
   Result result;
