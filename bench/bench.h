@@ -45,6 +45,14 @@ Result build_substitute_1m(const Options& options);
 Result build_substitute_growth(const Options& options);
 Result vpl_trace_night_city(const Options& options);
 Result vpl_trace_colonnade(const Options& options);
+Result frame_floor_sst_colonnade(const Options& options);
+Result frame_floor_sst_living_room(const Options& options);
+Result memory_per_vpl(const Options& options);
+Result sst_steps(const Options& options);
+Result sst_growth(const Options& options);
+Result slc_growth(const Options& options);
+Result error_sst_slc(const Options& options);
+Result error_sst_path2(const Options& options);
 
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

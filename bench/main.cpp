@@ -1,4 +1,4 @@
-// lumigrove-bench: runs measurements by name, prints a table, writes JSON.
+// lumigrove-bench: runs measurements by name or looks for the relations of a paper, prints a table, writes JSON.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
@@ -8,9 +8,11 @@
 
 #include "base/atomic_file.h"
 #include "base/nearest.h"
+#include "base/stopwatch.h"
 #include "bench.h"
 #include "lumigrove/error.h"
 #include "lumigrove/renderer.h"
+#include "reproduce.h"
 
 namespace lumigrove::bench {
 namespace {
@@ -66,48 +68,97 @@ void write_json(const std::string& file, const Options& options, const nlohmann:
   write_file_atomically(file, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
-int run(int argc, char** argv) {
+struct Command {
   Options options;
   std::vector<std::string> names;
+  std::string reproduction;
+  std::vector<int> checks;
   std::string json_file;
   int threads = 0;
   bool check = false;
+};
+
+// Exit status.
+int measure(const Command& command) {
+  std::vector<const Benchmark*> chosen;
+  for (const std::string& name : command.names) chosen.push_back(&find(name));
+  if (chosen.empty())
+    for (const Benchmark& benchmark : benchmarks()) chosen.push_back(&benchmark);
+  bool all_within = true;
+  nlohmann::ordered_json results = nlohmann::ordered_json::array();
+  for (const Benchmark* benchmark : chosen) {
+    const Result result = benchmark->run(command.options);
+    print_result(*benchmark, result);
+    results.push_back(to_json(*benchmark, result));
+    all_within = all_within && !exceeds_limit(*benchmark, result);
+  }
+  if (!command.json_file.empty()) write_json(command.json_file, command.options, results);
+  return command.check && !all_within ? 1 : 0;
+}
+
+const Reproduction& find_reproduction(const std::string& name) {
+  std::vector<std::string> names;
+  for (const Reproduction& reproduction : reproductions()) {
+    if (reproduction.name == name) return reproduction;
+    names.emplace_back(reproduction.name);
+  }
+  throw Error(fmt::format("There is no reproduction '{}'; there are: {}", name, fmt::join(names, ", ")));
+}
+
+// Exit status. Rows are printed as they are found.
+int reproduce(const Command& command) {
+  const Reproduction& reproduction = find_reproduction(command.reproduction);
+  const std::vector<int>& wanted = command.checks;
+  Relations relations;
+  fmt::print("{}\n{}", reproduction.description, relation_header());
+  for (const Check& check : reproduction.checks) {
+    if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), check.number) == wanted.end()) continue;
+    fmt::print(stderr, "check {}: {}\n", check.number, check.description);
+    const Stopwatch watch;
+    check.run([&](Relation relation) {
+      fmt::print("{}", relation_text(relation));
+      std::fflush(stdout);
+      relations.push_back(std::move(relation));
+    });
+    fmt::print(stderr, "check {}: {:.0f} s\n", check.number, watch.ms() * 1e-3);
+  }
+  const int failed = count_verdicts(relations, Verdict::kFails);
+  fmt::print("{} hold, {} within {} standard errors, {} do not hold, {} reported only\n",
+             count_verdicts(relations, Verdict::kHolds), count_verdicts(relations, Verdict::kWithinError), kSigmas,
+             failed, count_verdicts(relations, Verdict::kReported));
+  if (!command.json_file.empty()) {
+    nlohmann::ordered_json results = nlohmann::ordered_json::array();
+    for (const Relation& relation : relations) results.push_back(to_json(relation));
+    write_json(command.json_file, command.options, results);
+  }
+  return command.check && failed > 0 ? 1 : 0;
+}
+
+int run(int argc, char** argv) {
+  Command command;
   CLI::App app("Measures Lumigrove against what it must be compared with.");
-  app.add_option("name", names, "benchmarks to run, all when none is named; 'list' prints them");
-  app.add_option("--runs", options.runs, "repetitions of each side")
+  app.add_option("name", command.names, "benchmarks to run, all when none is named; 'list' prints them");
+  app.add_option("--runs", command.options.runs, "repetitions of each side")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("-t,--threads", threads, "threads, 0 = all cores")->check(CLI::Range(0, 1024));
-  app.add_option("--json", json_file, "also write the results to this file");
-  app.add_flag("--check", check, "exit status 1 when a value is above its limit");
+  app.add_option("-t,--threads", command.threads, "threads, 0 = all cores")->check(CLI::Range(0, 1024));
+  app.add_option("--json", command.json_file, "also write the results to this file");
+  app.add_flag("--check", command.check, "exit status 1 when a value is above its limit or a relation does not hold");
+  CLI::App* again = app.add_subcommand("reproduce", "Look for the relations that a paper reports");
+  again->add_option("paper", command.reproduction, "sst")->required();
+  again->add_option("--only", command.checks, "numbers of the groups of relations to look for, all when none is given");
+  again->fallthrough();
   CLI11_PARSE(app, argc, argv);
 
-  if (names == std::vector<std::string>{"list"}) {
+  if (command.names == std::vector<std::string>{"list"}) {
     print_list();
     return 0;
   }
-  if (names.empty()) {
-    for (const Benchmark& benchmark : benchmarks()) names.emplace_back(benchmark.name);
-  }
-  std::vector<const Benchmark*> chosen;
-  for (const std::string& name : names) chosen.push_back(&find(name));
-
-  const int workers = threads > 0 ? threads : tbb::this_task_arena::max_concurrency();
+  const int workers = command.threads > 0 ? command.threads : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(workers));
   tbb::task_arena arena(workers);
-  bool all_within = true;
-  arena.execute([&] {
-    nlohmann::ordered_json results = nlohmann::ordered_json::array();
-    for (const Benchmark* benchmark : chosen) {
-      const Result result = benchmark->run(options);
-      print_result(*benchmark, result);
-      results.push_back(to_json(*benchmark, result));
-      all_within = all_within && !exceeds_limit(*benchmark, result);
-    }
-    if (!json_file.empty()) write_json(json_file, options, results);
-  });
-  return check && !all_within ? 1 : 0;
+  return arena.execute([&] { return again->parsed() ? reproduce(command) : measure(command); });
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// The table of all measurements.
+// The tables of all measurements and reproductions.
 #include "bench.h"
+#include "reproduce.h"
 
 namespace lumigrove::bench {
 
@@ -29,6 +30,25 @@ const std::vector<Benchmark>& benchmarks() {
        "tracing of 100 k virtual point lights, 3 a path / the same rays through bare Embree", 2.0,
        vpl_trace_night_city},
       {"vpl.trace.colonnade", "ratio", "the same in colonnade", 2.0, vpl_trace_colonnade},
+      {"frame.floor.sst.colonnade", "ratio",
+       "sst, 1280x720, 1 sample a pixel, at most 100 k VPLs: frame / the same rays through bare Embree", 1.8,
+       frame_floor_sst_colonnade},
+      {"frame.floor.sst.living-room", "ratio", "the same in living-room", 1.8, frame_floor_sst_living_room},
+      {"memory.per-vpl", "bytes", "VPLs and their tree together, worse of two scenes", 200.0, memory_per_vpl},
+      {"sst.steps", "ratio", "mean steps of a walk among at most 100 k VPLs, sst / slc, worse of two scenes", 0.75,
+       sst_steps},
+      {"sst.growth", "ratio", "time of sst's samples among at most 1 M VPLs / 10 k, worse of two scenes", 1.4, sst_growth},
+      {"slc.growth", "ratio", "the same of slc", 2.6, slc_growth},
+      {"error.sst-slc", "ratio", "RMSE of sst / of slc at equal time in colonnade, diffuse", std::nullopt, error_sst_slc},
+      {"error.sst-path2", "ratio", "RMSE of sst / of path with 2 bounces at equal time in colonnade, diffuse",
+       std::nullopt, error_sst_path2},
+  };
+  return table;
+}
+
+const std::vector<Reproduction>& reproductions() {
+  static const std::vector<Reproduction> table = {
+      {"sst", "W. Tatzgern et al., Stochastic Substitute Trees for Real-Time Global Illumination, I3D 2020", sst_checks()},
   };
   return table;
 }

@@ -268,7 +268,7 @@ void draw_lights(const IndirectLighting& lighting, std::span<const WalkStart> st
                  std::span<DrawnLight> drawn) {
   const Drawing drawing(lighting, starts, lobe, drawn);
   launch(
-      indirect_batches(static_cast<int>(starts.size())),
+      static_cast<int>((starts.size() + kSubstituteWalks - 1) / kSubstituteWalks),
       [&](int b) { drawing.batch(static_cast<std::size_t>(b) * kSubstituteWalks); }, 16);
 }
 

@@ -29,7 +29,7 @@ void add_part(const Batch& batch, const VplSampler& sampler, CorrectionPart part
     launch(indirect_batches(batch.count()),
            IndirectLightKernel{sampler, batch.lighting.rng, dimension, 1.0f / static_cast<float>(batch.lighting.spp),
                                part, batch.surfaces, batch.pixels, b.shadow, b.contribution, corrected, traces},
-           kLaunchGrain / kSubstituteWalks);
+           kLaunchGrain / kSurfacesPerCall);
   }
   {
     const ScopedTimer timer(b.trace_ms);

@@ -21,11 +21,14 @@ struct VplTrace {
 // Numbers of a sample, from the first dimension on: lobe and walk; Gaussian; correction.
 inline constexpr std::uint32_t kDimensionsPerVplSample = 12;
 
+// Enough that the few walks for gloss fill batches of their own.
+inline constexpr int kSurfacesPerCall = kSubstituteWalks == 1 ? 1 : 1024;
+
 // Which half of a corrected sample is drawn (VplSampler::correction).
 enum class CorrectionPart : std::uint8_t { kSubstitute, kLeaf };
 
 // surfaces[i] -> shadow[i], contribution[i] (radiance towards wo if unoccluded). Rays that carry nothing are marked
-// untraced. One call does kSubstituteWalks surfaces, so that their walks down the tree go together.
+// untraced. One call does kSurfacesPerCall surfaces, so that their walks down the tree go together.
 struct IndirectLightKernel {
   VplSampler sampler;
   Rng rng;
@@ -40,14 +43,13 @@ struct IndirectLightKernel {
   std::span<VplTrace> traces;         // empty: not wanted
 
   LUMI_HD void operator()(int batch) const {
-    const std::size_t first = static_cast<std::size_t>(batch) * kSubstituteWalks;
-    const int count = static_cast<int>(glm::min<std::size_t>(kSubstituteWalks, surfaces.size() - first));
+    const std::size_t first = static_cast<std::size_t>(batch) * kSurfacesPerCall;
+    const std::size_t count = glm::min<std::size_t>(kSurfacesPerCall, surfaces.size() - first);
     if (sampler.choice == VplChoice::kTree) {
       light_by_walks(first, count);
       return;
     }
-    for (int k = 0; k < count; ++k) {
-      const std::size_t i = first + static_cast<std::size_t>(k);
+    for (std::size_t i = first; i < first + count; ++i) {
       if (!lights_up(i)) continue;
       const vec4 u = random_numbers(i, 0);
       const ChosenVpl chosen = choose_vpl(sampler, vec2(u.x, u.y));
@@ -70,51 +72,63 @@ struct IndirectLightKernel {
     return surfaces[i].instance != kNone;
   }
 
+  // Walks that wait until there are enough to go together.
+  struct Walks {
+    SubstituteWalkPoints points;
+    std::size_t index[kSubstituteWalks];
+    float scale[kSubstituteWalks];
+    int count = 0;
+
+    LUMI_HD void add(std::size_t i, const Surface& surface, vec4 u, float probability, bool gloss) {
+      points.set(count, surface, vec3(u.y, u.z, u.w), gloss);
+      scale[count] = 1 / probability;
+      index[count++] = i;
+    }
+    LUMI_HD bool full() const { return count == kSubstituteWalks; }
+  };
+
   // One lobe is lit a surface; the walks of each lobe go together.
-  LUMI_HD void light_by_walks(std::size_t first, int count) const {
-    SubstituteWalkPoints diffuse, gloss;
-    std::size_t diffuse_index[kSubstituteWalks], gloss_index[kSubstituteWalks];
-    float diffuse_scale[kSubstituteWalks], gloss_scale[kSubstituteWalks];
-    int diffuse_count = 0, gloss_count = 0;
-    for (int k = 0; k < count; ++k) {
-      const std::size_t i = first + static_cast<std::size_t>(k);
+  LUMI_HD void light_by_walks(std::size_t first, std::size_t count) const {
+    Walks diffuse, gloss;
+    for (std::size_t i = first; i < first + count; ++i) {
       if (!lights_up(i)) continue;
       const Surface& surface = surfaces[i];
       const vec4 u = random_numbers(i, 0);
       const float p = diffuse_walk_probability(sampler, surface);
-      if (u.x < p) {
-        diffuse.set(diffuse_count, surface, vec3(u.y, u.z, u.w), false);
-        diffuse_scale[diffuse_count] = scale / p;
-        diffuse_index[diffuse_count++] = i;
-      } else {
-        gloss.set(gloss_count, surface, vec3(u.y, u.z, u.w), true);
-        gloss_scale[gloss_count] = scale / (1 - p);
-        gloss_index[gloss_count++] = i;
-      }
+      if (u.x < p)
+        diffuse.add(i, surface, u, p, false);
+      else
+        gloss.add(i, surface, u, 1 - p, true);
+      if (diffuse.full()) light<false>(diffuse);
+      if (gloss.full()) light<true>(gloss);
     }
-    finish<false>(diffuse, diffuse_count, diffuse_index, diffuse_scale);
-    if (gloss_count > 0) finish<true>(gloss, gloss_count, gloss_index, gloss_scale);
+    if (diffuse.count > 0) light<false>(diffuse);
+    if (gloss.count > 0) light<true>(gloss);
   }
 
+  // Lights the surfaces of the walks and leaves none.
   template <bool kGloss>
-  LUMI_HD LUMI_ALWAYS_INLINE void finish(const SubstituteWalkPoints& points, int count, const std::size_t* index,
-                                         const float* lobe_scale) const {
+  LUMI_HD LUMI_ALWAYS_INLINE void light(Walks& walks) const {
     SubstituteWalk walk = sampler.walk;
     walk.substitutes = walk.substitutes && part == CorrectionPart::kSubstitute;
-    if (walk.tree.count == 0) return;
+    const int count = walk.tree.count > 0 ? walks.count : 0;
+    walks.count = 0;
+    if (count == 0) return;
     SubstituteWalkState state;
-    walk_to_ends<kGloss>(walk, points, count, state);
+    walk_to_ends<kGloss>(walk, walks.points, count, state);
     prefetch_ends(walk.tree, state, count);
     alignas(64) float gaussian[4][kSubstituteWalks] = {}, weight[kSubstituteWalks] = {};
+    const std::size_t* index = walks.index;
     for (int k = 0; k < count; ++k) {
       const bool substitute = end_of_walk(state, k) == WalkEnd::kSubstitute;
-      weight[k] = lobe_scale[k] * correct(index[k], substitute);
+      weight[k] = scale * walks.scale[k] * correct(index[k], substitute);
       if (!substitute) continue;
       const vec4 u = random_numbers(index[k], 1);
       for (int axis = 0; axis < 4; ++axis) gaussian[axis][k] = u[axis];
     }
     for (int first = 0; first < count; first += kWalkLanes)
-      finish_group<kGloss>(walk, points, state, first, glm::min(count - first, kWalkLanes), gaussian, weight, index);
+      finish_group<kGloss>(walk, walks.points, state, first, glm::min(count - first, kWalkLanes), gaussian, weight,
+                           index);
   }
 
   LUMI_HD LUMI_ALWAYS_INLINE void prefetch_ends(const SubstituteTreeView& tree, const SubstituteWalkState& state,
@@ -246,6 +260,6 @@ struct IndirectLightKernel {
 };
 
 // Calls of an IndirectLightKernel for so many surfaces.
-LUMI_HD inline int indirect_batches(int surfaces) { return (surfaces + kSubstituteWalks - 1) / kSubstituteWalks; }
+LUMI_HD inline int indirect_batches(int surfaces) { return (surfaces + kSurfacesPerCall - 1) / kSurfacesPerCall; }
 
 }  // namespace lumigrove

@@ -1,0 +1,254 @@
+#include "sst_study.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "device/device.h"
+#include "scene/surface_kernel.h"
+
+namespace lumigrove::bench {
+namespace {
+
+constexpr std::size_t kSurfacesATask = 512;
+
+// Calls light_part(first, count, buffers) for parts of all surfaces.
+template <class Function>
+void for_parts(std::size_t count, const Function& light_part) {
+  tbb::enumerable_thread_specific<IndirectBuffers> buffers;
+  launch(
+      static_cast<int>((count + kSurfacesATask - 1) / kSurfacesATask),
+      [&](int part) {
+        const std::size_t first = static_cast<std::size_t>(part) * kSurfacesATask;
+        tbb::this_task_arena::isolate(
+            [&] { light_part(first, std::min(kSurfacesATask, count - first), buffers.local()); });
+      },
+      1);
+}
+
+void add_values(const RgbImage& image, std::vector<double>& sum) {
+  sum.resize(image.rgb.size());
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += static_cast<double>(image.rgb[i]);
+}
+
+RgbImage divided(const std::vector<double>& sum, int count, RgbImage like) {
+  for (std::size_t i = 0; i < sum.size(); ++i) like.rgb[i] = static_cast<float>(sum[i] / count);
+  return like;
+}
+
+SampleImage layers_of(const Film& film, int samples) {
+  const Image image = develop(film, samples);
+  return {rgb_of(image, "", "render"), rgb_of(image, "indirect", "render")};
+}
+
+// Variance of the mean of several images, for one of their values.
+double mean_variance(const std::vector<Mean>& values) {
+  double sum = 0;
+  for (const Mean& value : values) sum += value.estimate().error * value.estimate().error;
+  return sum / static_cast<double>(values.size());
+}
+
+void add_to(std::vector<Mean>& values, const RgbImage& image) {
+  values.resize(image.rgb.size());
+  for (std::size_t i = 0; i < values.size(); ++i) values[i].add(static_cast<double>(image.rgb[i]));
+}
+
+}  // namespace
+
+Settings sst_settings(bool diffuse) {
+  Settings settings = make_preset("sst");
+  settings.force_diffuse = diffuse;
+  return settings;
+}
+
+Settings slc_settings(bool diffuse) {
+  Settings settings = make_preset("slc");
+  settings.force_diffuse = diffuse;
+  return settings;
+}
+
+Settings path_settings(bool diffuse, int bounces) {
+  Settings settings = make_preset("path");
+  settings.force_diffuse = diffuse;
+  settings.indirect.max_bounces = bounces;
+  return settings;
+}
+
+// --- means ---------------------------------------------------------------------------------------------------
+
+Estimate Mean::estimate() const { return {mean_, count_ > 1 ? std::sqrt(variance() / count_) : 0}; }
+
+Estimate ratio_of_means(std::span<const double> a, std::span<const double> b) {
+  Mean mean_a, mean_b, residual;
+  for (const double x : a) mean_a.add(x);
+  for (const double x : b) mean_b.add(x);
+  const double ratio = mean_a.mean() / mean_b.mean();
+  for (std::size_t i = 0; i < a.size(); ++i) residual.add(a[i] - ratio * b[i]);  // linearised about the means
+  return {ratio, residual.estimate().error / mean_b.mean()};
+}
+
+Estimate root(Estimate square) {
+  const double value = std::sqrt(square.value);
+  return {value, square.error / (2 * value)};
+}
+
+// --- a scene -------------------------------------------------------------------------------------------------
+
+Study::Study(Scene study_scene, const Settings& settings) : scene(std::move(study_scene)) {
+  RenderStats stats;
+  world = make_world(scene, settings, stats);
+}
+
+void Study::trace(const Settings& settings) {
+  RenderStats stats;
+  trace_vpls(*world, settings, 0, stats);
+}
+
+void Study::build_substitutes(float min_nu, float max_sigma) {
+  const VplView vpls = world->vpls.view();
+  world->substitutes.build(vpls, {Topology::kRadix, min_nu, max_sigma * vpls.diagonal, kInfinity});
+}
+
+SampleImage render_one(const Study& study, const Settings& settings) {
+  RenderStats stats;
+  Film film(settings.width, settings.height);
+  render_sample(*study.world, settings, 0, film, stats);
+  return layers_of(film, 1);
+}
+
+void ImageMean::add(const SampleImage& image) {
+  ++count_;
+  add_values(image.beauty, beauty_);
+  add_values(image.indirect, indirect_);
+  last_ = image;
+}
+
+SampleImage ImageMean::mean() const {
+  return {divided(beauty_, count_, last_.beauty), divided(indirect_, count_, last_.indirect)};
+}
+
+double mean_value(const RgbImage& image) {
+  double sum = 0;
+  for (const float value : image.rgb) sum += static_cast<double>(value);
+  return sum / static_cast<double>(image.rgb.size());
+}
+
+double tone_mapped_ssim(const RgbImage& reference, const RgbImage& test) {
+  const auto encoded = [](RgbImage image) {
+    image.rgb = tone_map(image.rgb, ToneMap{});
+    return image;
+  };
+  return ssim(encoded(reference), encoded(test));
+}
+
+Reference make_reference(const Scene& scene, bool diffuse, int spp) {
+  constexpr int kBounces = 7, kPart = 16, kDirectSpp = 8;
+  Settings settings = sized(path_settings(diffuse, kBounces), kErrorWidth, kErrorHeight);
+  settings.direct.spp = kDirectSpp;
+  const Study study(scene, settings);
+  ImageMean image;
+  std::vector<Mean> beauty, indirect;
+  for (int part = 0; part < spp / kPart; ++part) {
+    settings.seed = 1000000u + static_cast<std::uint32_t>(part);
+    RenderStats stats;
+    Film film(settings.width, settings.height);
+    for (int sample = 0; sample < kPart; ++sample) render_sample(*study.world, settings, sample, film, stats);
+    const SampleImage mean = layers_of(film, kPart);
+    image.add(mean);
+    add_to(beauty, mean.beauty);
+    add_to(indirect, mean.indirect);
+  }
+  return {image.mean(), mean_variance(beauty), mean_variance(indirect)};
+}
+
+double squared_error(const Reference& reference, const RgbImage& beauty) {
+  const double error = rmse(reference.image.beauty, beauty);
+  return error * error - reference.beauty_variance;
+}
+
+double squared_indirect_error(const Reference& reference, const RgbImage& indirect) {
+  const double error = rmse(reference.image.indirect, indirect);
+  return error * error - reference.indirect_variance;
+}
+
+// --- light at fixed surfaces -----------------------------------------------------------------------------------
+
+SeenSurfaces::SeenSurfaces(const World& world, const Settings& settings)
+    : width(settings.width), height(settings.height) {
+  const PixelWindow window{0, 0, width, height};
+  const auto n = static_cast<std::size_t>(window.count());
+  std::vector<Ray> rays(n);
+  std::vector<Hit> hits(n);
+  surfaces.resize(n);
+  pixels.resize(n);
+  launch(window.count(),
+         CameraKernel{make_camera_view(world.camera, width, height), window, rays, pixels, 0, 0, false});
+  world.tracer.closest(rays, hits, Coherence::kCoherent);
+  launch(window.count(), SurfaceKernel{world.arrays.view(), rays, hits, surfaces, settings.force_diffuse});
+}
+
+std::vector<vec3> light_surfaces(const IndirectLighting& lighting, const SeenSurfaces& seen) {
+  std::vector<vec3> light(seen.surfaces.size(), vec3(0));
+  for_parts(light.size(), [&](std::size_t first, std::size_t count, IndirectBuffers& buffers) {
+    add_indirect_light(lighting, std::span(seen.surfaces).subspan(first, count),
+                       std::span(seen.pixels).subspan(first, count), kDimIndirect, buffers,
+                       std::span(light).subspan(first, count));
+  });
+  return light;
+}
+
+std::vector<VplTrace> trace_walks(const IndirectLighting& lighting, const SeenSurfaces& seen) {
+  std::vector<VplTrace> traces(seen.surfaces.size());
+  for_parts(traces.size(), [&](std::size_t first, std::size_t count, IndirectBuffers& buffers) {
+    std::vector<vec3> light(count, vec3(0));
+    buffers.wants_traces = true;
+    add_indirect_light(lighting, std::span(seen.surfaces).subspan(first, count),
+                       std::span(seen.pixels).subspan(first, count), kDimIndirect, buffers, light);
+    std::copy(buffers.traces.begin(), buffers.traces.end(), traces.begin() + static_cast<std::ptrdiff_t>(first));
+  });
+  return traces;
+}
+
+// Pixels without a surface have not walked.
+double mean_steps(const std::vector<VplTrace>& traces) {
+  Mean steps;
+  for (const VplTrace& trace : traces)
+    if (trace.steps > 0) steps.add(static_cast<double>(trace.steps));
+  return steps.mean();
+}
+
+double mean_longest_steps(const std::vector<VplTrace>& traces) {
+  Mean steps;
+  for (std::size_t first = 0; first < traces.size(); first += kWalkLanes) {
+    float longest = 0;
+    for (std::size_t i = first; i < std::min(traces.size(), first + kWalkLanes); ++i)
+      longest = std::max(longest, traces[i].steps);
+    if (longest > 0) steps.add(static_cast<double>(longest));
+  }
+  return steps.mean();
+}
+
+// --- time ------------------------------------------------------------------------------------------------------
+
+double pass_ms(const Study& study, const Settings& settings, std::initializer_list<const char*> passes) {
+  RenderStats stats;
+  Film film(settings.width, settings.height);
+  render_sample(*study.world, settings, 0, film, stats);
+  double ms = 0;
+  for (const PassStats& pass : stats.passes)
+    for (const std::string_view name : passes) ms += pass.name == name ? pass.ms : 0;
+  return ms;
+}
+
+double sampling_ms(const Study& study, const Settings& settings) {
+  return pass_ms(study, settings, {"VPL selection", "VPL shadow rays"});
+}
+
+double path_ms(const Study& study, const Settings& settings) {
+  return pass_ms(study, settings, {"path rays", "path surfaces", "path light selection", "path shadow rays"});
+}
+
+}  // namespace lumigrove::bench
