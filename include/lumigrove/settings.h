@@ -18,6 +18,7 @@ namespace lumigrove {
 enum class Hierarchy : std::uint8_t { kNone, kPerfect };
 enum class Weights : std::uint8_t { kMinMax };
 enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut };
+enum class CutBound : std::uint8_t { kNearest, kExact, kChildren };
 enum class Transport : std::uint8_t { kNone, kPath, kVpl };
 enum class IndirectHierarchy : std::uint8_t { kNone, kSubstitute };
 enum class Topology : std::uint8_t { kRadix, kPerfect };
@@ -37,7 +38,7 @@ struct DirectSettings {
   int cut_share = 8;            // k: blocks of k x k pixels share a cut; 1 = a cut for every pixel
   int cut_interleave = 1;       // m: the pixels of m x m share out a cut's nodes
   float cut_floor = 0.001f;     // least distance in the bound, in units of the diagonal of the lights' box
-  bool cut_exact = false;       // cosine bounds are bounds, not the nearest point's
+  CutBound cut_bound = CutBound::kChildren;
 };
 
 // Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D.

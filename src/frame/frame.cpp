@@ -307,7 +307,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
       direct.use_cuts = true;
       const float floor = settings.direct.cut_floor * direct.sampler.lights.bounds.diagonal();
       direct.cut = {settings.direct.spp, std::max(floor * floor, direct.sampler.tree.inside2),
-                    settings.direct.cut_exact};
+                    settings.direct.cut_bound};
       direct.lookup.share = settings.direct.cut_share;
       direct.lookup.interleave = settings.direct.cut_interleave;
       direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);

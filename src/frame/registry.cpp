@@ -252,9 +252,13 @@ std::vector<Setting> direct_rows() {
       real(
           "direct.cut_floor", [](auto& s) -> auto& { return s.direct.cut_floor; }, {0, 1, true}, "R",
           "Least distance in the error bound of cuts; R = diagonal of the lights' box"),
-      flag(
-          "direct.cut_exact", [](auto& s) -> auto& { return s.direct.cut_exact; },
-          "The error bound of cuts bounds the cosine exactly; otherwise by the box's nearest point"),
+      choice(
+          "direct.cut_bound", [](auto& s) -> auto& { return s.direct.cut_bound; },
+          vector<pair<string, CutBound>>{{"nearest", CutBound::kNearest},
+                                         {"exact", CutBound::kExact},
+                                         {"children", CutBound::kChildren}},
+          "Error of a cut's node: by one box around its lights, with the cosine of the box's nearest point or an exact "
+          "bound of it; or the sum over the boxes inside it"),
   };
 }
 

@@ -4,7 +4,7 @@
 //             3.4 sharing and interleaving; B. Walter et al., "Lightcuts", SIGGRAPH 2005, for the bound; authors' code.
 // Symbols     I_j -> SubtreeBounds::intensity -> as the nodes hold it, share of all local flux
 //             F_j -> cosine_bound -> bound of the cosine at the receiver over the node's box, no material
-//             E_j = I_j F_j / max(d_min^2, floor) -> cut_error; leaves have none, since they are sampled exactly
+//             E_j = I_j F_j / max(d_min^2, floor) -> box_error; leaves have none, since they are sampled exactly
 //             n -> CutOptions::size -> nodes of a cut
 //             k, m -> CutLookup::share, interleave -> pixels of a block's edge that share a cut, or its samples
 //             R_L -> diagonal of the lights' bounds; the floor is (0.001 R_L)^2
@@ -12,6 +12,9 @@
 //             -> entries_of_pixel
 // Departures  The tree's nodes have W children; the binary nodes that the paper cuts at are halves, quarters, ... of
 //             these, put together when needed. Cuts shorter than n happen only where there are too few lights.
+//             By default a node's error is the sum of the bounds of the children of the wide node that it belongs to, with
+//             their own boxes and cones (CutBound::kChildren): tighter than the bound over one box around all of them,
+//             which is largest wherever that box holds the point. The others are the paper's and the code's.
 //             Pixels without a surface pass the choice of the representative on to the next one.
 // Estimator   unbiased: a cut is a partition of all lights, whatever pixel it was chosen for, and one light is sampled
 //             below each node. Interleaved, unbiased as the mean over m^2 frames.
@@ -19,6 +22,7 @@
 // Oracle      tests/lightcuts_test.cpp: partition of the lights, greedy choice against a plain one, exhaustive sum.
 #pragma once
 
+#include "lumigrove/settings.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "scene/camera_kernel.h"
 #include "scene/surface.h"
@@ -31,7 +35,7 @@ inline constexpr int kMaxCut = 32;
 struct CutOptions {
   int size = 8;              // n
   float floor2 = 0;          // m^2
-  bool exact_cosine = false;
+  CutBound bound = CutBound::kChildren;
 };
 
 struct LightCut {
@@ -104,16 +108,31 @@ LUMI_HD inline float cosine_bound(Box3 box, vec3 x, vec3 n, bool exact) {
   return height / glm::sqrt(aside2 + height * height);
 }
 
-LUMI_HD inline float cut_error(const SubtreeBounds& bounds, vec3 x, vec3 n, const CutOptions& options) {
+LUMI_HD inline float box_error(const SubtreeBounds& bounds, vec3 x, vec3 n, const CutOptions& options) {
   const vec3 nearest = glm::clamp(x, bounds.box.lo, bounds.box.hi) - x;
-  return bounds.intensity * cosine_bound(bounds.box, x, n, options.exact_cosine) /
+  return bounds.intensity * cosine_bound(bounds.box, x, n, options.bound == CutBound::kExact) /
          glm::max(length_squared(nearest), options.floor2);
 }
 
+// Bounds of what each child of a node can send, their own boxes and cones taken for themselves.
 template <int W>
-LUMI_HD inline float error_of(const LightTreeView& tree, Subtree subtree, const SubtreeBounds& bounds, vec3 x, vec3 n,
-                              const CutOptions& options) {
-  return is_leaf(tree, subtree) ? 0.0f : cut_error(bounds, x, n, options);
+LUMI_HD inline Lanes<W> child_errors(const LightTreeView& tree, Subtree subtree, vec3 x, vec3 n, float floor2) {
+  const LightNode<W>& node = tree.level<W>(subtree.level)[subtree.node];
+  return weigh_boxes<W>(
+             load_boxes<W>(node), subtree.level >= tree.first_cones, [&] { return load_cones<W>(node); }, floor2,
+             broadcast<W>(x), broadcast<W>(n))
+      .near;
+}
+
+template <int W>
+LUMI_HD inline float cut_error(const LightTreeView& tree, Subtree subtree, const SubtreeBounds& bounds, vec3 x, vec3 n,
+                               const CutOptions& options) {
+  if (is_leaf(tree, subtree)) return 0;
+  if (options.bound != CutBound::kChildren) return box_error(bounds, x, n, options);
+  float errors[W], sum = 0;
+  store_lanes<W>(child_errors<W>(tree, subtree, x, n, options.floor2), errors);
+  for (int c = subtree.first; c < subtree.first + subtree.children; ++c) sum += errors[c];
+  return sum;
 }
 
 // Splits the node of the greatest error until there are n, or none has any.
@@ -123,7 +142,7 @@ LUMI_HD inline void select_cut(const LightTreeView& tree, vec3 x, vec3 n, const 
   if (tree.count == 0) return;
   const Subtree root = descend<W>(tree, binary_root(tree));
   cut.nodes[0] = root;
-  cut.error[0] = error_of<W>(tree, root, bounds_of<W>(tree, root), x, n, options);
+  cut.error[0] = cut_error<W>(tree, root, bounds_of<W>(tree, root), x, n, options);
   cut.count = 1;
   while (cut.count < options.size) {
     int worst = 0;
@@ -143,7 +162,7 @@ LUMI_HD inline void select_cut(const LightTreeView& tree, vec3 x, vec3 n, const 
       // The first takes the place of what is split, the second is appended.
       const int place = written++ == 0 ? worst : cut.count++;
       cut.nodes[place] = child;
-      cut.error[place] = error_of<W>(tree, child, bounds, x, n, options);
+      cut.error[place] = cut_error<W>(tree, child, bounds, x, n, options);
     }
   }
 }

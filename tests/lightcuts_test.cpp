@@ -1,0 +1,314 @@
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <set>
+
+#include "light_fixtures.h"
+#include "light_scenes.h"
+#include "lumigrove/renderer.h"
+#include "methods/lightcuts/cut_kernel.h"
+#include "statistics.h"
+
+namespace lumigrove {
+namespace {
+
+using namespace lumigrove::testing;
+
+// Leaves [first, end) below a node of a cut.
+struct LeafRange {
+  std::uint32_t first, end;
+};
+LeafRange leaves_below(const LightTreeView& tree, Subtree s) {
+  std::uint64_t span = 1;  // leaves below a child
+  for (int level = s.level + 1; level < tree.levels; ++level) span *= static_cast<std::uint64_t>(tree.width);
+  const std::uint64_t first = (static_cast<std::uint64_t>(s.node) * static_cast<std::uint64_t>(tree.width) + s.first) * span;
+  const std::uint64_t end = first + s.children * span;
+  return {static_cast<std::uint32_t>(std::min<std::uint64_t>(first, tree.count)),
+          static_cast<std::uint32_t>(std::min<std::uint64_t>(end, tree.count))};
+}
+
+LightCut cut_at(const LightTreeView& tree, const Surface& s, const CutOptions& options) {
+  LightCut cut;
+  switch (tree.width) {
+    case 2:
+      select_cut<2>(tree, s.position, s.normal, options, cut);
+      break;
+    case 4:
+      select_cut<4>(tree, s.position, s.normal, options, cut);
+      break;
+    case 8:
+      select_cut<8>(tree, s.position, s.normal, options, cut);
+      break;
+    default:
+      select_cut<16>(tree, s.position, s.normal, options, cut);
+  }
+  return cut;
+}
+
+SubtreeBounds bounds_at(const LightTreeView& tree, Subtree s) {
+  switch (tree.width) {
+    case 2:
+      return bounds_of<2>(tree, s);
+    case 4:
+      return bounds_of<4>(tree, s);
+    case 8:
+      return bounds_of<8>(tree, s);
+    default:
+      return bounds_of<16>(tree, s);
+  }
+}
+
+Scene cloud_of(int n) { return n >= 4 ? triangle_cloud(n, 0.2f, 11) : punctual_cloud(n, 12); }
+
+TEST(LightCut, IsAPartitionOfAllLights) {
+  for (const int width : {2, 4, 8, 16})
+    for (const int n : {1, 2, 3, 5, 16, 17, 64, 200, 1000}) {
+      const LightWorld world(cloud_of(n), {width, true, true});
+      const LightTreeView tree = world.tree().view();
+      for (const Surface& s : shading_points(12))
+        for (const int size : {1, 2, 7, 8, 32})
+          for (const CutBound bound : {CutBound::kNearest, CutBound::kExact, CutBound::kChildren}) {
+            const LightCut cut = cut_at(tree, s, {size, 1e-4f, bound});
+            ASSERT_LE(cut.count, size);
+            ASSERT_GE(cut.count, 1);
+            std::vector<LeafRange> ranges;
+            for (int i = 0; i < cut.count; ++i) ranges.push_back(leaves_below(tree, cut.nodes[i]));
+            std::sort(ranges.begin(), ranges.end(), [](LeafRange a, LeafRange b) { return a.first < b.first; });
+            std::uint32_t next = 0;
+            for (const LeafRange& range : ranges) {
+              ASSERT_EQ(range.first, next) << "width " << width << ", " << n << " lights, " << size << " nodes";
+              ASSERT_LT(range.first, range.end);
+              next = range.end;
+            }
+            ASSERT_EQ(next, tree.count);
+          }
+    }
+}
+
+TEST(LightCut, OfNoLightsIsEmpty) {
+  const LightWorld world(punctual_cloud(0));
+  EXPECT_EQ(cut_at(world.tree().view(), shading_points(1)[0], {8, 1e-4f}).count, 0);
+}
+
+// A node is split before another of smaller error, hence no node left has a larger error than any that was split.
+TEST(LightCut, SplitsTheLargestErrors) {
+  const LightWorld world(triangle_cloud(600, 0.2f, 13));
+  const LightTreeView tree = world.tree().view();
+  for (const Surface& s : shading_points(40)) {
+    const CutOptions longer{8, 1e-4f}, shorter{7, 1e-4f};
+    const LightCut a = cut_at(tree, s, shorter), b = cut_at(tree, s, longer);
+    if (b.count <= a.count) {  // nothing left to split
+      for (int i = 0; i < a.count; ++i) EXPECT_EQ(a.error[i], 0);
+      continue;
+    }
+    const int worst = static_cast<int>(std::max_element(a.error, a.error + a.count) - a.error);
+    for (int i = 0; i < a.count; ++i) {
+      const bool kept = std::any_of(b.nodes, b.nodes + b.count, [&](Subtree n) { return n == a.nodes[i]; });
+      EXPECT_EQ(kept, i != worst);
+    }
+  }
+}
+
+TEST(LightCut, ErrorIsTheBoundOfThePaper) {
+  const LightWorld world(triangle_cloud(300, 0.2f, 14));
+  const LightTreeView tree = world.tree().view();
+  for (const Surface& s : shading_points(20)) {
+    const CutOptions options{16, 0.01f, CutBound::kExact};
+    const LightCut cut = cut_at(tree, s, options);
+    for (int i = 0; i < cut.count; ++i) {
+      const SubtreeBounds bounds = bounds_at(tree, cut.nodes[i]);
+      if (is_leaf(tree, cut.nodes[i])) {
+        EXPECT_EQ(cut.error[i], 0);
+        continue;
+      }
+      // Sampled points of the box never have a larger cosine or a smaller distance than the bound allows.
+      Stream random(static_cast<std::uint32_t>(i));
+      for (int k = 0; k < 50; ++k) {
+        const vec3 y = random.in_box(bounds.box.lo, bounds.box.hi) - s.position;
+        const float d2 = glm::max(glm::dot(y, y), options.floor2);
+        const float cosine = glm::max(0.0f, glm::dot(y, s.normal)) / glm::sqrt(glm::dot(y, y));
+        EXPECT_LE(bounds.intensity * cosine / d2, cut.error[i] * 1.0001f + 1e-12f);
+      }
+    }
+  }
+}
+
+TEST(PixelOrder, IsOneToOneAndHasAnInverse) {
+  for (const PixelWindow& window : {PixelWindow{0, 0, 64, 64}, PixelWindow{3, 5, 40, 42}, PixelWindow{0, 0, 1, 9},
+                                    PixelWindow{7, 7, 8, 8}, PixelWindow{1, 2, 30, 5}, PixelWindow{0, 0, 9, 65}}) {
+    std::set<std::pair<int, int>> seen;
+    for (int i = 0; i < window.count(); ++i) {
+      const Pixel p = pixel_of_index(window, i);
+      ASSERT_TRUE(p.x >= window.x0 && p.x < window.x1 && p.y >= window.y0 && p.y < window.y1);
+      ASSERT_TRUE(seen.insert({p.x, p.y}).second);
+      ASSERT_EQ(index_of_pixel(window, p), i);
+    }
+  }
+}
+
+TEST(PixelOrder, SixtyFourInARowAreABlock) {
+  const PixelWindow window{64, 128, 128, 192};
+  for (int i = 0; i < window.count(); ++i) {
+    const Pixel first = pixel_of_index(window, i / 64 * 64), p = pixel_of_index(window, i);
+    EXPECT_EQ(p.x / 8, first.x / 8);
+    EXPECT_EQ(p.y / 8, first.y / 8);
+  }
+}
+
+TEST(CutLookup, BlocksShareOutThePixels) {
+  for (const int share : {1, 3, 8, 13, 64}) {
+    const CutLookup lookup{{60, 33, 124, 90}, share, 1, 0};
+    std::vector<int> found(static_cast<std::size_t>(lookup.window.count()), 0);
+    for (int block = 0; block < lookup.blocks(); ++block) {
+      const PixelWindow pixels = lookup.pixels_of(block);
+      ASSERT_GT(pixels.count(), 0);
+      for (int y = pixels.y0; y < pixels.y1; ++y)
+        for (int x = pixels.x0; x < pixels.x1; ++x) {
+          ASSERT_EQ(lookup.block_of({x, y}), block);
+          ++found[static_cast<std::size_t>(index_of_pixel(lookup.window, {x, y}))];
+        }
+    }
+    EXPECT_EQ(std::count(found.begin(), found.end(), 1), lookup.window.count());
+  }
+}
+
+TEST(CutLookup, InterleavedPixelsShareOutTheNodes) {
+  for (const int m : {1, 2, 3, 4})
+    for (const int nodes : {1, 3, 8, 17, 32}) {
+      std::vector<int> over_pixels(static_cast<std::size_t>(nodes), 0), over_frames = over_pixels;
+      CutLookup lookup{{0, 0, 64, 64}, 8, m, 5};
+      for (int y = 0; y < m; ++y)
+        for (int x = 0; x < m; ++x) {
+          const CutEntries e = entries_of_pixel(lookup, {x + 2 * m, y + 3 * m}, nodes);
+          EXPECT_LE(e.end - e.first, lookup.passes(nodes));
+          for (int i = e.first; i < e.end; ++i) ++over_pixels[static_cast<std::size_t>(i)];
+        }
+      for (int frame = 0; frame < m * m; ++frame) {
+        lookup.frame = static_cast<std::uint32_t>(frame);
+        const CutEntries e = entries_of_pixel(lookup, {3, 4}, nodes);
+        for (int i = e.first; i < e.end; ++i) ++over_frames[static_cast<std::size_t>(i)];
+      }
+      EXPECT_EQ(over_pixels, std::vector<int>(static_cast<std::size_t>(nodes), 1));
+      EXPECT_EQ(over_frames, std::vector<int>(static_cast<std::size_t>(nodes), 1));
+    }
+}
+
+// --- whole frames ------------------------------------------------------------------------------------------
+
+// A room with a box in it, lit by many small quads on the ceiling and around the box: neighbouring pixels look at
+// surfaces that different lights reach. A sun shines in where the sky is seen.
+Scene room_of_lights() {
+  SceneBuilder b;
+  const int wall = b.material(vec3(0.6f));
+  b.quad(vec3(-3, 0, -3), vec3(0, 0, 6), vec3(6, 0, 0), wall);
+  b.quad(vec3(-3, 0, -3), vec3(6, 0, 0), vec3(0, 3, 0), wall);
+  b.room(vec3(0.8f, 1.2f, 0.4f), vec3(-0.4f, 0.02f, -0.8f), b.material(vec3(0.3f, 0.6f, 0.4f)));  // fronts outside
+  Stream random(31);
+  for (int i = 0; i < 40; ++i) {
+    const int bright = b.material(vec3(0), random.in_box(vec3(0.5f), vec3(6)));
+    const vec3 at = i < 20 ? random.in_box(vec3(-2.5f, 2.8f, -2.5f), vec3(2.5f, 3, 2.5f))
+                           : random.in_box(vec3(-2, 0.1f, -2.5f), vec3(2, 1.5f, -1.2f));
+    b.quad(at, vec3(0.1f, 0, 0), i < 20 ? vec3(0, 0, 0.1f) : vec3(0, 0.1f, 0), bright);
+  }
+  PunctualLight sun;
+  sun.type = LightType::kDirectional;
+  sun.color = vec3(0.4f);
+  b.punctual(sun, vec3(0), glm::normalize(vec3(0.4f, -1, -0.3f)));
+  return b.scene;
+}
+
+Settings view_of_lights(const std::string& preset, int spp) {
+  Settings settings = square_view(preset, 20, vec3(0.3f, 1.7f, 3.4f), vec3(0, 0.7f, -1), 60);
+  settings.spp = spp;
+  return settings;
+}
+
+// z-scores of the pixels' direct light (green) in `a` against `b`, by the images' own variances.
+std::vector<double> z_scores(const Image& a, const Image& b) {
+  const auto value = [](const Image& image, const char* layer, std::size_t i) {
+    return static_cast<double>(image.find(layer)->values[3 * i + 1]);
+  };
+  std::vector<double> z;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(a.width) * static_cast<std::size_t>(a.height); ++i) {
+    const double variance = value(a, "variance", i) + value(b, "variance", i);
+    if (variance > 0) z.push_back((value(a, "direct", i) - value(b, "direct", i)) / std::sqrt(variance));
+  }
+  return z;
+}
+
+// Means of 400 pixels, each of noise known within some per cent.
+void expect_same_mean(const Image& image, const Image& truth, const std::string& what) {
+  const std::vector<double> z = z_scores(image, truth);
+  ASSERT_GT(z.size(), 300u);
+  double sum = 0, worst = 0;
+  for (const double score : z) {
+    sum += score;
+    worst = std::max(worst, std::abs(score));
+  }
+  EXPECT_LT(std::abs(sum) / std::sqrt(static_cast<double>(z.size())), 3.5) << what;
+  EXPECT_LT(worst, 5.5) << what;
+}
+
+TEST(SharedCuts, HaveTheExhaustiveSumAsMean) {
+  const Scene scene = room_of_lights();
+  const Image truth = render(scene, view_of_lights("exhaustive", 64));
+  struct Variant {
+    int nodes, share, interleave, width;
+    bool cones;
+  };
+  for (const Variant& v : {Variant{8, 8, 1, 16, true}, Variant{8, 1, 1, 16, true}, Variant{8, 8, 2, 16, true},
+                           Variant{5, 3, 1, 2, false}, Variant{32, 16, 3, 4, true}, Variant{1, 8, 1, 8, true}}) {
+    Settings settings = view_of_lights("rtslc", 144);
+    settings.direct.spp = v.nodes;
+    settings.direct.cut_share = v.share;
+    settings.direct.cut_interleave = v.interleave;
+    settings.direct.width = v.width;
+    settings.direct.cones = v.cones;
+    expect_same_mean(render(scene, settings), truth,
+                     std::to_string(v.nodes) + " nodes, shared by " + std::to_string(v.share) + ", interleaved by " +
+                         std::to_string(v.interleave));
+  }
+}
+
+TEST(SharedCuts, HaveLessNoiseThanAsManyWalksFromTheRoot) {
+  const Scene scene = room_of_lights();
+  const auto noise = [&](const char* selection) {
+    Settings settings = view_of_lights("rtslc", 32);
+    set_value(settings, "direct.selection", selection);
+    const Image image = render(scene, settings);
+    double sum = 0;
+    for (const float v : image.find("variance")->values) sum += v;
+    return sum;
+  };
+  EXPECT_LT(noise("cut"), 0.9 * noise("root"));
+}
+
+TEST(SharedCuts, DoNotDependOnThreadsOrCropWindows) {
+  const Scene scene = room_of_lights();
+  Settings settings = view_of_lights("rtslc", 2);
+  settings.width = 150;  // more than one tile
+  const Image one = [&] {
+    settings.threads = 1;
+    return render(scene, settings);
+  }();
+  for (const int threads : {2, 4}) {
+    settings.threads = threads;
+    EXPECT_EQ(render(scene, settings).find("direct")->values, one.find("direct")->values);
+  }
+}
+
+TEST(SharedCuts, RefuseWhatTheyCannotDo) {
+  Settings settings = make_preset("rtslc");
+  settings.direct.spp = 33;
+  EXPECT_THROW(check(settings), Error);
+  settings = make_preset("rtslc");
+  settings.direct.hierarchy = Hierarchy::kNone;
+  EXPECT_THROW(check(settings), Error);
+  settings = make_preset("rtslc");
+  settings.direct.mis = true;
+  EXPECT_THROW(check(settings), Error);
+}
+
+}  // namespace
+}  // namespace lumigrove
