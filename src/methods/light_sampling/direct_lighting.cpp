@@ -10,6 +10,7 @@ namespace {
 
 // `scale`: 1 / samples.
 void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler, float scale, const CutSamples& cuts,
+                    int stratum, int strata,
                     std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
                     std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   const int count = static_cast<int>(surfaces.size());
@@ -17,7 +18,7 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
     const ScopedTimer timer(buffers.select_ms);
     launch(walk_batches(count),
            DirectLightKernel{sampler, lighting.rng, dimension, scale, lighting.mis, surfaces, pixels,
-                             buffers.shadow, buffers.contribution, cuts},
+                             buffers.shadow, buffers.contribution, cuts, stratum, strata},
            kLaunchGrain / kWalkBatch);
   }
   {
@@ -43,7 +44,7 @@ void add_cut_samples(const DirectLighting& lighting, std::span<const Surface> su
   const float interleave2 = static_cast<float>(lookup.interleave * lookup.interleave);
   for (int pass = 0; pass < passes; ++pass)
     add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(passes),
-                   {buffers.cuts, lookup, pass, interleave2}, surfaces, pixels,
+                   {buffers.cuts, lookup, pass, interleave2}, 0, 1, surfaces, pixels,
                    dimension + 4 * static_cast<std::uint32_t>(pass), buffers, sum);
 }
 
@@ -74,7 +75,7 @@ void add_direct_light(const DirectLighting& lighting, std::span<const Surface> s
       const std::uint32_t block =
           light * static_cast<std::uint32_t>(lighting.spp) + static_cast<std::uint32_t>(s);
       current.rng.seed = lighting.rng.seed + 0x9e3779b9u * (block / kBlocks);
-      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, surfaces, pixels,
+      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, lighting.all ? 0 : s, lighting.all ? 1 : lighting.spp, surfaces, pixels,
                      dimension + 4 * (block % kBlocks), buffers, sum);
     }
   }

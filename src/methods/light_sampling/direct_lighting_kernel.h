@@ -33,6 +33,8 @@ struct DirectLightKernel {
   std::span<Ray> shadow;
   std::span<vec3> contribution;
   CutSamples cuts = {};  // none: walks start at the root
+  // Of the samples that a surface takes one after another, this one chooses its light in its own part of [0,1).
+  int stratum = 0, strata = 1;
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
@@ -49,7 +51,10 @@ struct DirectLightKernel {
 
  private:
   LUMI_HD vec4 random_numbers(std::size_t i) const {
-    return Rng{rng.seed, rng.frame, pixels[i]}.uniform4(dimension);
+    vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(dimension);
+    u.x = (static_cast<float>(stratum) + u.x) / static_cast<float>(strata);
+    u.x = glm::min(u.x, 0x1.fffffep-1f);
+    return u;
   }
 
   // Marks the outputs as carrying nothing; is there a surface to light?
