@@ -89,7 +89,7 @@ inline Lanes<W> load_first_lanes(const float* from, int count) {
   if constexpr (W == 16) return (Lanes<W>)_mm512_maskz_loadu_ps(static_cast<__mmask16>((1u << count) - 1), from);
 #endif
   Lanes<W> lanes{};
-  std::memcpy(&lanes, from, static_cast<std::size_t>(count) * sizeof(float));
+  if (count > 0) std::memcpy(&lanes, from, static_cast<std::size_t>(count) * sizeof(float));
   return lanes;
 }
 
