@@ -36,6 +36,7 @@ const std::vector<Benchmark>& benchmarks();  // registry.cpp
 // One file each.
 Result frame_floor_night_city(const Options& options);
 Result frame_floor_cornell_lights(const Options& options);
+Result frame_floor_rtslc_cornell_lights(const Options& options);
 Result build_tree_1m(const Options& options);
 Result sample_scaling(const Options& options);
 Result memory_per_emitter(const Options& options);

@@ -8,9 +8,9 @@ namespace {
 
 // Every frame of an animation gathers the lights, builds the tree and renders. The acceleration structure is left out on
 // both sides: the floor replays rays through a finished one.
-Result frame_over_floor(const char* scene_name, const Options& options) {
+Result frame_over_floor(const char* scene_name, const char* preset, const Options& options) {
   const Scene scene = load_scene(scene_name);
-  const Settings settings = make_preset("tree");
+  const Settings settings = make_preset(preset);
   RenderStats stats;
   const std::unique_ptr<World> world = make_world(scene, settings, stats);
   Film film(settings.width, settings.height);
@@ -58,9 +58,12 @@ Result frame_over_floor(const char* scene_name, const Options& options) {
 
 }  // namespace
 
-Result frame_floor_night_city(const Options& options) { return frame_over_floor("night-city", options); }
+Result frame_floor_night_city(const Options& options) { return frame_over_floor("night-city", "tree", options); }
 Result frame_floor_cornell_lights(const Options& options) {
-  return frame_over_floor("cornell-lights", options);
+  return frame_over_floor("cornell-lights", "tree", options);
+}
+Result frame_floor_rtslc_cornell_lights(const Options& options) {
+  return frame_over_floor("cornell-lights", "rtslc", options);
 }
 
 }  // namespace lumigrove::bench

