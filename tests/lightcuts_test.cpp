@@ -244,7 +244,9 @@ void expect_same_mean(const Image& image, const Image& truth, bool pixels, const
     worst = std::max(worst, std::abs(score));
   }
   EXPECT_LT(std::abs(sum) / std::sqrt(static_cast<double>(z.size())), 3.5) << what;
-  if (pixels) EXPECT_LT(worst, 5.5) << what;
+  if (pixels) {
+    EXPECT_LT(worst, 5.5) << what;
+  }
 }
 
 TEST(SharedCuts, HaveTheExhaustiveSumAsMean) {
