@@ -50,7 +50,7 @@ struct SurfaceBatch {
     world->tracer.closest(rays, hits, Coherence::kCoherent);
     launch(window.count(), SurfaceKernel{world->arrays.view(), rays, hits, all});
     for (const Surface& surface : all) {
-      if (surface.instance == kNone) continue;
+      if (surface.instance == kNoId) continue;
       pixels.push_back(static_cast<std::uint32_t>(surfaces.size()));
       surfaces.push_back(surface);
     }

@@ -285,7 +285,7 @@ TEST(IndirectLighting, TracesSayWhatTheWalksDid) {
 TEST(IndirectLightKernel, BatchesMatchSingleSamples) {
   const VplRoom room(glossy_room());
   std::vector<Surface> surfaces = room.surfaces(700, kEye);
-  for (std::size_t i = 0; i < surfaces.size(); i += 11) surfaces[i].instance = kNone;
+  for (std::size_t i = 0; i < surfaces.size(); i += 11) surfaces[i].instance = kNoId;
   const std::vector<std::uint32_t> pixels = numbered(surfaces.size());
   const std::size_t n = surfaces.size();
   for (const bool substitutes : {false, true}) {
@@ -311,7 +311,7 @@ TEST(IndirectLightKernel, BatchesMatchSingleSamples) {
               : walk_substitute_tree<true>(sampler.walk, points, 1, &walk);
       vec3 expected(0);
       Ray ray;
-      if (walk.end != WalkEnd::kDead && s.instance != kNone) {
+      if (walk.end != WalkEnd::kDead && s.instance != kNoId) {
         VplPoint light = vpl_of_walk(sampler, walk, rng.uniform4(kDimIndirect + 4));
         light.intensity /= diffuse ? p : 1 - p;
         expected = vpl_light(s, light, sampler.clamp, diffuse ? Lobes::kDiffuse : Lobes::kGloss);
@@ -425,7 +425,7 @@ TEST(IndirectLighting, NothingHitGetsNothing) {
   const VplRoom room(glossy_room());
   std::vector<Surface> surfaces = room.surfaces(300, kEye);
   const std::vector<Surface> hit = surfaces;
-  for (std::size_t i = 0; i < surfaces.size(); i += 3) surfaces[i].instance = kNone;
+  for (std::size_t i = 0; i < surfaces.size(); i += 3) surfaces[i].instance = kNoId;
   for (const Selection selection : {Selection::kUniform, Selection::kRoot, Selection::kAll}) {
     IndirectLighting lighting = room.lighting(selection);
     lighting.sampler.walk.substitutes = selection == Selection::kRoot;

@@ -193,7 +193,7 @@ TEST(LightSampler, VarianceDoesNotDependOnTheNumberOfTriangles) {
 TEST(DirectLightKernel, BatchesOfWalksMatchSingleSamples) {
   const LightWorld world(far_clusters_under_a_sky());
   std::vector<Surface> surfaces = shading_points(150);
-  for (std::size_t i = 0; i < 150; i += 7) surfaces[i].instance = kNone;
+  for (std::size_t i = 0; i < 150; i += 7) surfaces[i].instance = kNoId;
   std::vector<std::uint32_t> pixels(150);
   for (std::uint32_t i = 0; i < 150; ++i) pixels[i] = 1000 + i;
   std::vector<Ray> shadow(150);
@@ -205,7 +205,7 @@ TEST(DirectLightKernel, BatchesOfWalksMatchSingleSamples) {
   int lit = 0;
   for (std::size_t i = 0; i < 150; ++i) {
     vec3 expected(0);
-    if (surfaces[i].instance != kNone) {
+    if (surfaces[i].instance != kNoId) {
       const vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(kDimLight);
       const LightSample sample = sample_light(sampler, surfaces[i], u);
       const float cosine = glm::dot(surfaces[i].normal, sample.wi);
@@ -221,7 +221,7 @@ TEST(DirectLightKernel, BatchesOfWalksMatchSingleSamples) {
 TEST(DirectLightKernel, MarksRaysThatCarryNothingAsUntraced) {
   const LightWorld world(triangle_cloud(100, 0.3f));
   std::vector<Surface> surfaces = shading_points(200);
-  for (std::size_t i = 0; i < 50; ++i) surfaces[i].instance = kNone;
+  for (std::size_t i = 0; i < 50; ++i) surfaces[i].instance = kNoId;
   std::vector<std::uint32_t> pixels(200);
   for (std::uint32_t i = 0; i < 200; ++i) pixels[i] = i;
   std::vector<Ray> shadow(200);

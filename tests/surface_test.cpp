@@ -63,8 +63,8 @@ struct OneTriangle {
 TEST(Surface, OfAMissHasNoInstance) {
   const SceneView view{};
   const Surface s = make_surface(view, Ray{vec3(0), 0, vec3(0, 0, -2), kInfinity}, Hit{}, false);
-  EXPECT_EQ(s.instance, kNone);
-  EXPECT_EQ(s.emitter, kNone);
+  EXPECT_EQ(s.instance, kNoId);
+  EXPECT_EQ(s.emitter, kNoId);
   EXPECT_EQ(s.t, 0);
   EXPECT_EQ(s.wo, vec3(0, 0, 1));
   EXPECT_EQ(s.emission, vec3(0));

@@ -144,11 +144,11 @@ void expect_agreement(const World& world, const Tracer& tracer, Coherence cohere
   tracer.occluded(rays, occluded, coherence);
   int tested = 0, hit_count = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    EXPECT_EQ(occluded[i] != 0, hits[i].instance != kNone) << i;
+    EXPECT_EQ(occluded[i] != 0, hits[i].instance != kNoId) << i;
     const BruteHit brute = intersect(world, rays[i]);
     if (brute.doubtful) continue;
     ++tested;
-    ASSERT_EQ(hits[i].instance != kNone, brute.hit) << i;
+    ASSERT_EQ(hits[i].instance != kNoId, brute.hit) << i;
     if (!brute.hit) continue;
     ++hit_count;
     EXPECT_EQ(hits[i].instance, brute.instance) << i;
@@ -317,7 +317,7 @@ TEST(Tracer, IgnoresRaysThatAreNotToBeTraced) {
     tracer.closest(rays, hits, coherence);
     tracer.occluded(rays, occluded, coherence);
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      EXPECT_EQ(hits[i].instance, i <= 10 ? kNone : 1u) << i;
+      EXPECT_EQ(hits[i].instance, i <= 10 ? kNoId : 1u) << i;
       EXPECT_EQ(occluded[i], i <= 10 ? 0 : 1) << i;
     }
   }
@@ -358,7 +358,7 @@ TEST(Tracer, HitsNothingInAnEmptyScene) {
   std::vector<std::uint8_t> occluded(3, 1);
   tracer.closest(rays, hits, Coherence::kCoherent);
   tracer.occluded(rays, occluded, Coherence::kIncoherent);
-  for (const Hit& hit : hits) EXPECT_EQ(hit.instance, kNone);
+  for (const Hit& hit : hits) EXPECT_EQ(hit.instance, kNoId);
   for (const std::uint8_t o : occluded) EXPECT_EQ(o, 0);
   tracer.closest({}, {}, Coherence::kCoherent);
 }

@@ -125,7 +125,7 @@ void print_pixel(const TreeOptions& options, const Settings& settings, const Wor
   report.y = (*settings.pixel_bounds)[2];
   report.surface = seen.surfaces.at(0);
   const std::uint32_t pixel = seen.pixels.at(0);
-  if (report.surface.instance == kNone)
+  if (report.surface.instance == kNoId)
     throw Error(fmt::format("no surface is seen at pixel {},{}", report.x, report.y));
   if (options.gloss && !lights_gloss(lighting.sampler, report.surface))
     throw Error(fmt::format("the surface at pixel {},{} has no gloss lobe that walks would light", report.x, report.y));

@@ -20,7 +20,7 @@ struct EmissionKernel {
   LUMI_HD void operator()(int index) const {
     const std::size_t i = static_cast<std::size_t>(index);
     Surface& surface = surfaces[i];
-    if (surface.instance == kNone) {
+    if (surface.instance == kNoId) {
       const bool sky = lights.environment.present() && rays[i].tmax >= rays[i].tmin;
       seen[i] =
           sky ? environment_radiance(scene, lights.environment, glm::normalize(rays[i].direction)) : vec3(0);

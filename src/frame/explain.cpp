@@ -128,7 +128,7 @@ void count_inside(const World& world, const IndirectLighting& lighting, std::spa
   world.tracer.closest(rays, hits, Coherence::kIncoherent);
   const SceneView scene = world.arrays.view();
   for (std::size_t i = 0; i < hits.size(); ++i) {
-    if (hits[i].instance == kNone) continue;
+    if (hits[i].instance == kNoId) continue;
     const auto& instance = scene.instances[hits[i].instance];
     const auto& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh)];
     const WorldTriangle triangle = world_triangle(mesh, instance, mesh.triangles[hits[i].triangle]);
@@ -280,7 +280,7 @@ vec3 unoccluded_light(const IndirectLighting& lighting, const Surface& surface, 
 WalkStatistics measure_walks(const World& world, const IndirectLighting& lighting, const SeenSurfaces& seen) {
   std::vector<WalkStart> starts;
   for (std::size_t i = 0; i < seen.surfaces.size(); ++i)
-    if (seen.surfaces[i].instance != kNone) starts.push_back({&seen.surfaces[i], seen.pixels[i], walk_dimension(0)});
+    if (seen.surfaces[i].instance != kNoId) starts.push_back({&seen.surfaces[i], seen.pixels[i], walk_dimension(0)});
   std::vector<DrawnLight> drawn(starts.size());
   draw_lights(lighting, starts, {}, drawn);
   std::vector<vec3> light(starts.size());

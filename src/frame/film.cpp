@@ -51,7 +51,7 @@ Layer walk_layer(const Film& film) {
 FilmPixel black_pixel() {
   FilmPixel pixel{};
   pixel.depth = kInfinity;
-  pixel.emitter = pixel.instance = kNone;
+  pixel.emitter = pixel.instance = kNoId;
   return pixel;
 }
 

@@ -21,7 +21,7 @@ struct FilmPixel {
   float alpha;                      // share of samples that hit something
   vec3 position;                    // world, metres
   float depth;                      // metres along the view direction, infinite where nothing was hit
-  std::uint32_t emitter, instance;  // stable id of the emitter hit, index of the mesh instance; kNone
+  std::uint32_t emitter, instance;  // stable id of the emitter hit, index of the mesh instance; kNoId
 };
 
 // Light of one camera sample for every entry of a batch.
@@ -43,13 +43,13 @@ struct FilmKernel {
     const std::size_t i = static_cast<std::size_t>(index);
     const Surface& surface = surfaces[i];
     FilmPixel& pixel = film[pixels[i]];
-    const bool hit = surface.instance != kNone;
+    const bool hit = surface.instance != kNoId;
     if (sample == 0) {
       pixel = FilmPixel{};
       pixel.position = hit ? surface.position : vec3(0);
       pixel.depth = hit ? glm::dot(surface.position - eye, forward) : kInfinity;
       pixel.instance = surface.instance;
-      pixel.emitter = surface.emitter == kNone ? kNone : stable_id(lights, surface.emitter);
+      pixel.emitter = surface.emitter == kNoId ? kNoId : stable_id(lights, surface.emitter);
     }
     const float weight = 1 / static_cast<float>(sample + 1);
     const vec3 old_mean = pixel.direct + pixel.indirect + pixel.emission;

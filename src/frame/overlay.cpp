@@ -101,7 +101,7 @@ Scenery make_scenery(const World& world, const Settings& settings, const Image& 
   s.depth.assign(s.seen.pixels.size(), kInfinity);
   for (std::size_t i = 0; i < s.seen.pixels.size(); ++i) {
     const Surface& surface = s.seen.surfaces[i];
-    if (surface.instance != kNone)
+    if (surface.instance != kNoId)
       s.depth[s.seen.pixels[i]] = glm::dot(surface.position - s.camera.position, s.camera.forward);
   }
   s.picture = beauty(rendered, tone);
@@ -121,7 +121,7 @@ std::vector<DrawnLight> walk_everywhere(const Scenery& s, const IndirectLighting
   std::vector<WalkStart> starts;
   std::vector<std::size_t> index;
   for (std::size_t i = 0; i < s.pixels(); ++i) {
-    if (s.seen.surfaces[i].instance == kNone) continue;
+    if (s.seen.surfaces[i].instance == kNoId) continue;
     starts.push_back({&s.seen.surfaces[i], s.seen.pixels[i], walk_dimension(sample)});
     index.push_back(i);
   }
@@ -254,7 +254,7 @@ PixelMeans mean_over_walks(const Scenery& s, const IndirectLighting& lighting, c
   for (int w = 0; w < kShownWalks; ++w) {
     const std::vector<DrawnLight> drawn = walk_everywhere(s, lighting, w);
     for (std::size_t i = 0; i < drawn.size(); ++i) {
-      if (s.seen.surfaces[i].instance == kNone) continue;
+      if (s.seen.surfaces[i].instance == kNoId) continue;
       ++means.walks;
       const float v = value(drawn[i].walk);
       if (std::isnan(v)) continue;

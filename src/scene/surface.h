@@ -8,7 +8,7 @@ namespace lumigrove {
 // Normals face the viewer (both are flipped together when the back is seen).
 struct Surface {
   vec3 position;
-  float t = 0;                // distance from the ray's origin, metres; 0 with instance == kNone: nothing hit
+  float t = 0;                // distance from the ray's origin, metres; 0 with instance == kNoId: nothing hit
   vec3 geometric_normal;      // unit
   float roughness = 1;        // linear roughness in [0.08, 1]; alpha = roughness^2
   vec3 normal;                // unit shading normal, same side as geometric_normal

@@ -103,15 +103,15 @@ LUMI_HD inline void write_surface(const SceneView& scene, const Ray& ray, const 
   const float squared = length_squared(ray.direction);
   const float inverse = squared > 0.0f ? 1.0f / glm::sqrt(squared) : 0.0f;
   s.wo = ray.direction * -inverse;
-  s.emitter = kNone;
+  s.emitter = kNoId;
   s.emission = vec3(0);
   s.pad = 0;
-  if (hit.instance == kNone) {
+  if (hit.instance == kNoId) {
     s.position = s.diffuse = s.specular = vec3(0);
     s.geometric_normal = s.normal = s.wo;
     s.t = s.epsilon = 0;
     s.roughness = 1;
-    s.instance = kNone;
+    s.instance = kNoId;
     s.triangle = 0;
     return;
   }
@@ -175,9 +175,9 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch_surfaces(const SceneView& scene, std::s
   const auto mesh_of = [&](const Hit& hit) -> const MeshView& {
     return scene.meshes[static_cast<std::size_t>(scene.instances[hit.instance].mesh)];
   };
-  if (const Hit& far = hits[i + 2 * kAhead]; far.instance != kNone) prefetch(&mesh_of(far).triangles[far.triangle]);
+  if (const Hit& far = hits[i + 2 * kAhead]; far.instance != kNoId) prefetch(&mesh_of(far).triangles[far.triangle]);
   const Hit& near = hits[i + kAhead];
-  if (near.instance == kNone) return;
+  if (near.instance == kNoId) return;
   const MeshView& mesh = mesh_of(near);
   const uvec3 triangle = mesh.triangles[near.triangle];
   for (int k = 0; k < 3; ++k) {

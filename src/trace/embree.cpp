@@ -242,7 +242,7 @@ void Tracer::Impl::attach_opaque(const SceneState& state) {
     first_vertex[i + 1] = first_vertex[i] + mesh.positions.size();
     first_triangle[i + 1] = first_triangle[i] + mesh.triangles.size();
   }
-  if (first_vertex.back() >= kNone || first_triangle.back() >= kNone) {
+  if (first_vertex.back() >= kNoId || first_triangle.back() >= kNoId) {
     throw Error("The scene has more than 4 billion vertices or triangles.");
   }
   const GeometryPointer geometry = make_triangles(device.get());
@@ -264,7 +264,7 @@ void Tracer::Impl::attach_opaque(const SceneState& state) {
   });
   rtcCommitGeometry(geometry.get());
   rtcAttachGeometry(baked.get(), geometry.get());
-  baked_instances.push_back(kNone);
+  baked_instances.push_back(kNoId);
 }
 
 void Tracer::Impl::attach_masked(const SceneState& state, std::uint32_t id) {

@@ -16,10 +16,10 @@ struct Ray {
   float tmax = -1;
 };
 
-inline constexpr std::uint32_t kNone = 0xffffffffu;
+inline constexpr std::uint32_t kNoId = 0xffffffffu;
 
 struct Hit {
-  std::uint32_t instance = kNone;  // index into SceneState::instances
+  std::uint32_t instance = kNoId;  // index into SceneState::instances
   std::uint32_t triangle = 0;      // index into Mesh::triangles
   float u = 0, v = 0;              // barycentric: p = (1-u-v) p0 + u p1 + v p2
   float t = 0;                     // in units of direction

@@ -40,7 +40,7 @@ struct DirectBuffers {
 
 // sum[i] += light reaching surfaces[i] from the chosen lights and leaving it towards wo (radiance).
 // `pixels[i]` keys the random numbers, `dimension` is the first one used (kDimLight of the path vertex). All
-// spans have equal length; surfaces with instance == kNone get nothing.
+// spans have equal length; surfaces with instance == kNoId get nothing.
 void add_direct_light(const DirectLighting& lighting, std::span<const Surface> surfaces,
                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
                       std::span<vec3> sum);

@@ -6,6 +6,7 @@
 
 #include "base/rng.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/light_sampling/triangle_lanes.h"
 #include "methods/lightcuts/cut_kernel.h"
 #include "scene/bsdf.h"
 
@@ -61,7 +62,7 @@ struct DirectLightKernel {
   LUMI_HD bool lights_up(std::size_t i) const {
     shadow[i].tmax = -1;
     contribution[i] = vec3(0);
-    return surfaces[i].instance != kNone;
+    return surfaces[i].instance != kNoId;
   }
 
   // Where the walk of a surface starts; without children where this pass has no node for its pixel.
@@ -104,10 +105,29 @@ struct DirectLightKernel {
       prefetch(emitter);
       prefetch(&emitter->source);
     }
-    for (int k = 0; k < walks; ++k)
-      write(index[k],
-            light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], vec2(numbers[k].y, numbers[k].z)),
-            cuts.cuts.empty() ? scale : cuts.scale);
+    TriangleLighting triangles;
+    const float local_scale = cuts.cuts.empty() ? scale : cuts.scale;
+    for (int k = 0; k < walks; ++k) {
+      const vec2 u(numbers[k].y, numbers[k].z);
+      if (!add_triangle(triangles, index[k], groups[k], chosen[k], u, local_scale))
+        write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], u), local_scale);
+    }
+    constexpr int kLanes = kWalkBatch < 16 ? kWalkBatch : 16;
+    for (int at = 0; at < triangles.count; at += kLanes)
+      write_lit<kLanes>(light_by_triangles<kLanes>(triangles, at), glm::min(kLanes, triangles.count - at),
+                        triangles.index + at, shadow, contribution);
+  }
+
+  // Plain triangles wait to be lit together. False for other lights.
+  LUMI_HD bool add_triangle(TriangleLighting& triangles, std::uint32_t i, const ChosenGroup& group, TreeSample chosen,
+                            vec2 u, float weight) const {
+    if (mis || !(chosen.pdf > 0)) return false;
+    const Emitter& e = sampler.lights.emitters[chosen.emitter];
+    if (e.punctual()) return false;
+    const EmissiveInstance& instance = sampler.lights.instances[e.source];
+    if (instance.textured || instance.masked) return false;
+    triangles.add(i, surfaces[i], e, instance, u, weight / (chosen.pdf * group.probability));
+    return true;
   }
 
   // Walks that start at one place go together: all of them without cuts, and those of a block that shares one.

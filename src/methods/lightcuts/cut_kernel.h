@@ -217,7 +217,7 @@ struct CutKernel {
       const int at = (random + k) % count;
       const Pixel pixel{pixels.x0 + at % pixels.width(), pixels.y0 + at / pixels.width()};
       const Surface& s = surfaces[static_cast<std::size_t>(index_of_pixel(lookup.window, pixel))];
-      if (s.instance == kNone) continue;
+      if (s.instance == kNoId) continue;
       select(s, cut);
       return;
     }

@@ -31,7 +31,7 @@ int start(const Batch& batch, std::span<const Surface> first) {
   PathBuffers& b = batch.buffers;
   compact(
       static_cast<int>(first.size()),
-      [&](int i) { return first[static_cast<std::size_t>(i)].instance != kNone; }, b.kept);
+      [&](int i) { return first[static_cast<std::size_t>(i)].instance != kNoId; }, b.kept);
   b.surfaces.resize(b.kept.size());
   b.paths.resize(b.kept.size());
   const int count = static_cast<int>(b.kept.size());
@@ -65,7 +65,7 @@ int arrive(const Batch& batch, int count, int ray_number) {
   if (batch.finds_emitters() && sampler.lights.environment.present())
     launch(count, PathEscapeKernel{batch.density(ray_number), b.surfaces, b.paths, b.rays, b.hits, film});
   compact(
-      count, [&](int i) { return b.hits[static_cast<std::size_t>(i)].instance != kNone; }, b.kept);
+      count, [&](int i) { return b.hits[static_cast<std::size_t>(i)].instance != kNoId; }, b.kept);
   b.next_surfaces.resize(b.kept.size());
   b.next_paths.resize(b.kept.size());
   const int arrived = static_cast<int>(b.kept.size());

@@ -44,7 +44,7 @@ struct PathBuffers {
 // direct[i] += light that surfaces[i] receives straight from emitters, as far as BSDF samples find it
 // (nothing without mis): complete once the caller adds light sampling with the same `lighting`. indirect[i]
 // += light that took 1 to max_bounces detours. Both are radiance towards the viewer. `pixels[i]` keys the
-// random numbers; all spans have equal length; surfaces with instance == kNone get nothing. Storage grows
+// random numbers; all spans have equal length; surfaces with instance == kNoId get nothing. Storage grows
 // with the batch: give it an image in tiles.
 void add_path_light(const PathTracing& tracing, std::span<const Surface> surfaces,
                     std::span<const std::uint32_t> pixels, PathBuffers& buffers, std::span<vec3> direct,

@@ -122,7 +122,7 @@ struct PathEscapeKernel {
   LUMI_HD void operator()(int index) const {
     const auto i = static_cast<std::size_t>(index);
     const PathState& path = paths[i];
-    if (!(path.pdf > 0) || hits[i].instance != kNone) return;
+    if (!(path.pdf > 0) || hits[i].instance != kNoId) return;
     const vec3 wi = rays[i].direction;
     const vec3 radiance = environment_radiance(density.sampler.scene, density.sampler.lights.environment, wi);
     const float weight = balance_weight(path.pdf, density.pdf_of_escape(surfaces[i], wi));

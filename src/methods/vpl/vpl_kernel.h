@@ -133,7 +133,7 @@ struct VplBounceKernel {
     const Ray arriving = rays[i];
     rays[i].tmax = -1;
     vpls[i].intensity = vec3(0);
-    if (hits[i].instance == kNone) return;
+    if (hits[i].instance == kNoId) return;
     const Surface surface = make_surface(scene, arriving, hits[i], force_diffuse);
     VplPath& path = paths[i];
     path.flux *= range_window(surface.t * surface.t, path.range);

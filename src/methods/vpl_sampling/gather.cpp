@@ -47,7 +47,7 @@ void add_kind(const Gather& gather, GatherKind kind, std::span<const Surface> su
   {
     const ScopedTimer timer(b.surface_ms);
     compact(
-        count, [&](int i) { return b.hits[static_cast<std::size_t>(i)].instance != kNone; }, b.kept);
+        count, [&](int i) { return b.hits[static_cast<std::size_t>(i)].instance != kNoId; }, b.kept);
     b.next_surfaces.resize(b.kept.size());
     b.next_pixels.resize(b.kept.size());
     b.next_states.resize(b.kept.size());

@@ -53,7 +53,7 @@ struct GatherScatterKernel {
     const Surface& s = surfaces[i];
     rays[i] = Ray{};
     states[i] = {vec3(0), static_cast<std::uint32_t>(i)};
-    if (s.instance == kNone) return;
+    if (s.instance == kNoId) return;
     const bool mirror = follows_mirror(s, mirror_roughness);
     if (kind == GatherKind::kMirror && !mirror) return;
     const vec3 u(Rng{rng.seed, rng.frame, pixels[i]}.uniform4(dimension));
@@ -99,7 +99,7 @@ struct GatherArriveKernel {
     if (kind == GatherKind::kMirror) return;
     const float lost = lost_to_clamp(y, y.t, clamp);
     next_states[j].throughput *= lost;
-    if (!(lost > 0)) y.instance = kNone;  // nothing to be lit
+    if (!(lost > 0)) y.instance = kNoId;  // nothing to be lit
   }
 };
 

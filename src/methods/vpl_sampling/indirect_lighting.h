@@ -38,7 +38,7 @@ struct IndirectBuffers {
 
 // sum[i] += light of the virtual point lights that reaches surfaces[i] and leaves it towards wo (radiance).
 // `pixels[i]` keys the random numbers, `dimension` is the first one used. All spans have equal length; surfaces with
-// instance == kNone get nothing.
+// instance == kNoId get nothing.
 void add_indirect_light(const IndirectLighting& lighting, std::span<const Surface> surfaces,
                         std::span<const std::uint32_t> pixels, std::uint32_t dimension, IndirectBuffers& buffers,
                         std::span<vec3> sum);

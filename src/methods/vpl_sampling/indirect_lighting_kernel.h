@@ -69,7 +69,7 @@ struct IndirectLightKernel {
     shadow[i].tmax = -1;
     contribution[i] = vec3(0);
     if (part == CorrectionPart::kLeaf && !corrected[i]) return false;
-    return surfaces[i].instance != kNone;
+    return surfaces[i].instance != kNoId;
   }
 
   // Walks that wait until there are enough to go together.
@@ -158,29 +158,7 @@ struct IndirectLightKernel {
     if constexpr (kGloss)
       write_gloss(light, first, count, index);
     else
-      write_diffuse(light_diffuse_lobes<L>(sampler, points, first, light), first, count, index);
-  }
-
-  LUMI_HD LUMI_ALWAYS_INLINE void write_diffuse(const LitLanes<kWalkLanes>& lit, int first, int count,
-                                                const std::size_t* index) const {
-    constexpr int L = kWalkLanes;
-    const Lanes<L> columns[8] = {lit.origin.x,    lit.origin.y,    lit.origin.z,    lit.tmin,
-                                 lit.direction.x, lit.direction.y, lit.direction.z, lit.tmax};
-    alignas(64) float ray[8][L], radiance[3][L];
-    for (int w = 0; w < 8; ++w) store_lanes<L>(columns[w], ray[w]);
-    store_lanes<L>(lit.radiance.x, radiance[0]);
-    store_lanes<L>(lit.radiance.y, radiance[1]);
-    store_lanes<L>(lit.radiance.z, radiance[2]);
-    forget_registers();
-    for (int k = 0; k < count; ++k) {
-      if (!(ray[7][k] > 0)) continue;
-      const std::size_t i = index[first + k];
-      Ray& to = shadow[i];
-      to.origin.x = ray[0][k], to.origin.y = ray[1][k], to.origin.z = ray[2][k], to.tmin = ray[3][k];
-      to.direction.x = ray[4][k], to.direction.y = ray[5][k], to.direction.z = ray[6][k], to.tmax = 1;
-      vec3& sent = contribution[i];
-      sent.x = radiance[0][k], sent.y = radiance[1][k], sent.z = radiance[2][k];
-    }
+      write_lit<L>(light_diffuse_lobes<L>(sampler, points, first, light), count, index + first, shadow, contribution);
   }
 
   LUMI_HD LUMI_ALWAYS_INLINE void write_gloss(const LightLanes<kWalkLanes>& light, int first, int count,

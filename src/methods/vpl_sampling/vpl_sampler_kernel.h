@@ -17,6 +17,7 @@
 #pragma once
 
 #include "lights/alias_table.h"
+#include "lights/lit_lanes.h"
 #include "methods/substitute_tree/substitute_draw_kernel.h"
 #include "trace/ray.h"
 
@@ -119,13 +120,6 @@ LUMI_HD inline VplPoint vpl_of_walk(const VplSampler& sampler, const WalkResult&
 }
 
 // --- many at once ------------------------------------------------------------------------------------------
-
-template <int L>
-struct LitLanes {
-  LaneVec3<L> radiance;  // as vpl_light of the diffuse lobe
-  LaneVec3<L> origin, direction;
-  Lanes<L> tmin, tmax;   // as vpl_shadow_ray; tmax -1 where there is no light
-};
 
 // vpl_light and vpl_shadow_ray for the diffuse lobes of a group of surfaces.
 template <int L>
