@@ -50,7 +50,7 @@ TEST(AliasTable, AllZeroHasNoTotal) {
   EXPECT_EQ(table.view().total, 0.0f);
 }
 
-// Uniform, power and tree against the exhaustive sum on four scenes, points inside and outside of boxes.
+// Uniform, power, tree and light BVH against the exhaustive sum on four scenes, points inside and outside of boxes.
 TEST(LightSampler, MeanOfEverySelectionIsTheExhaustiveSum) {
   constexpr int kDraws = 60000;
   for (const NamedScene& named : light_scenes()) {
@@ -58,12 +58,12 @@ TEST(LightSampler, MeanOfEverySelectionIsTheExhaustiveSum) {
     Stream random(21);
     for (const Surface& s : shading_points(5, 43)) {
       const RunningMean truth = exhaustive(world.sampler(LightChoice::kUniform), s, 300, random);
-      for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree}) {
+      for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree, LightChoice::kBvh}) {
         const LightSampler sampler = world.sampler(choice);
         RunningMean mean;
         for (int i = 0; i < kDraws; ++i) mean.add(sample_value(sample_light(sampler, s, random.next()), s));
         const double error = std::hypot(mean.standard_error(), truth.standard_error());
-        // 60 comparisons: 4.5 standard errors keep false alarms below one in a thousand.
+        // 80 comparisons: 4.5 standard errors keep false alarms below one in a thousand.
         EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * error + 1e-6 * truth.mean())
             << named.name << ", choice " << static_cast<int>(choice);
       }
@@ -75,7 +75,7 @@ TEST(LightSampler, MeanOfEverySelectionIsTheExhaustiveSum) {
 TEST(LightSampler, PdfOfASampleIsTheSamplePdf) {
   for (const NamedScene& named : light_scenes()) {
     const LightWorld world(named.scene);
-    for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree}) {
+    for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree, LightChoice::kBvh}) {
       const LightSampler sampler = world.sampler(choice);
       Stream random(4);
       int compared = 0;

@@ -19,6 +19,13 @@ struct CutSamples {
   float scale = 1;  // m^2: interleaved pixels sample only their share of the nodes
 };
 
+// The split sets of a light BVH (SplitKernel), and which entry of each is sampled.
+struct SplitSamples {
+  std::span<const std::uint32_t> entries;
+  std::span<const std::uint8_t> counts;
+  int cap = 0, pass = 0;
+};
+
 // surfaces[i] -> shadow[i], contribution[i] (radiance towards wo if unoccluded). Rays that carry nothing are
 // marked untraced. Surfaces take their random numbers from `dimension`. One call does kWalkBatch surfaces, so that
 // their walks down the tree go together.
@@ -32,7 +39,8 @@ struct DirectLightKernel {
   std::span<const std::uint32_t> pixels;
   std::span<Ray> shadow;
   std::span<vec3> contribution;
-  CutSamples cuts;  // none: walks start at the root
+  CutSamples cuts = {};     // none: walks start at the root
+  SplitSamples split = {};  // likewise, kBvh
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
@@ -43,7 +51,11 @@ struct DirectLightKernel {
     }
     for (int k = 0; k < count; ++k) {
       const std::size_t i = first + static_cast<std::size_t>(k);
-      if (lights_up(i)) write(i, sample_light(sampler, surfaces[i], random_numbers(i)), scale);
+      if (!lights_up(i)) continue;
+      if (split.counts.empty())
+        write(i, sample_light(sampler, surfaces[i], random_numbers(i)), scale);
+      else
+        light_by_split(i);
     }
   }
 
@@ -57,6 +69,25 @@ struct DirectLightKernel {
     shadow[i].tmax = -1;
     contribution[i] = vec3(0);
     return surfaces[i].instance != kNone;
+  }
+
+  // One sample below this pass's entry. Lights at infinity have one in each of the surface's passes.
+  LUMI_HD void light_by_split(std::size_t i) const {
+    const int count = split.counts[i], passes = glm::max(1, count);
+    if (split.pass >= passes) return;
+    const Surface& surface = surfaces[i];
+    const vec4 u = random_numbers(i);
+    const ChosenGroup group = choose_group(sampler, surface, u.x);
+    const vec2 u_point(u.y, u.z);
+    if (group.group != LightGroup::kLocal) {
+      write(i, light_in_group(sampler, surface, group, {}, u_point), scale / static_cast<float>(passes));
+      return;
+    }
+    if (split.pass >= count) return;
+    const std::uint32_t entry = split.entries[i * static_cast<std::size_t>(split.cap) + static_cast<std::size_t>(split.pass)];
+    const TreeSample chosen =
+        sample_light_bvh(sampler.bvh, entry, surface.position, surface.normal, vec2(group.r, u.w));
+    write(i, light_in_group(sampler, surface, group, chosen, u_point), scale);
   }
 
   // Where the walk of a surface starts; without children where this pass has no node for its pixel.
