@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cstring>
-#include <functional>
 
 #include "light_fixtures.h"
 #include "methods/light_bvh/light_bvh_costs.h"
+#include "methods/light_sampling/direct_lighting_kernel.h"
 #include "statistics.h"
 
 namespace lumigrove {
@@ -209,8 +209,8 @@ TEST(LightBvhAgglomerative, CostIsSymmetricAndNeverFallsAsClustersGrow) {
 // --- both builders -------------------------------------------------------------------------------------------
 
 TEST(LightBvh, SameBitsForAnyThreadCount) {
-  const Scene scene = triangle_cloud(20000, 0.01f);
   for (const Hierarchy builder : kBuilders) {
+    const Scene scene = triangle_cloud(builder == Hierarchy::kSaoh ? 20000 : 1500, 0.01f);
     std::vector<std::vector<std::byte>> nodes;
     for (const std::size_t threads : {1u, 2u, 4u}) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -273,20 +273,38 @@ TEST(LightBvh, CoincidentLightsAreAllFoundWithTheirShare) {
   }
 }
 
-TEST(LightBvh, ProbabilitiesSumToOneOrLessOnADeadBranch) {
+TEST(LightBvh, ProbabilitiesSumToOneWhereEveryLightIsAbove) {
+  Scene scene;
+  Stream random(6);
+  add_node(scene, {add_mesh(scene, add_material(scene, vec3(0)), {vec3(-5), vec3(5, -5, -5), vec3(5)})});
+  for (int i = 0; i < 300; ++i) {
+    PunctualLight light;
+    light.color = random.in_box(vec3(0.01f), vec3(3));
+    add_light(scene, light, random.in_box(vec3(-5), vec3(5)));
+  }
+  for (const LightBvh::Options& options : kBvhs) {
+    const BvhWorld world(scene, options);
+    for (int i = 0; i < 20; ++i) {
+      const vec3 x = random.in_box(vec3(-6, -40, -6), vec3(6, -5.1f, 6));
+      double sum = 0;
+      for (std::uint32_t e = 0; e < world.lights.lights().emitters.size(); ++e)
+        sum += pdf_light_bvh(world.bvh.view(), kBvhRoot, x, vec3(0, 1, 0), e);
+      EXPECT_NEAR(sum, 1, 1e-4) << name_of(options);
+    }
+  }
+}
+
+TEST(LightBvh, ProbabilitiesNeverSumToMoreThanOne) {
   for (const NamedScene& named : light_scenes()) {
     for (const LightBvh::Options& options : kBvhs) {
       const BvhWorld world(named.scene, options);
       const LightBvhView bvh = world.bvh.view();
-      int whole = 0;
       for (const Surface& s : shading_points(60)) {
         double sum = 0;
         for (std::uint32_t e = 0; e < world.lights.lights().emitters.size(); ++e)
           sum += pdf_light_bvh(bvh, kBvhRoot, s.position, s.normal, e);
         EXPECT_LE(sum, 1 + 1e-4) << named.name << ", " << name_of(options);
-        whole += sum > 1 - 1e-4;
       }
-      EXPECT_GT(whole, 10) << named.name << ", " << name_of(options);
     }
   }
 }
