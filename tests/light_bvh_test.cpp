@@ -441,7 +441,7 @@ TEST(LightBvhSplit, MeanOverAllPassesIsTheExhaustiveSum) {
       RunningMean estimate[kPoints], truth[kPoints];
       for (std::uint32_t round = 0; round < kRounds; ++round) {
         double sum[kPoints] = {};
-        for (int pass = 0; pass < kCap; ++pass) {
+        for (int pass = 0; pass <= kCap; ++pass) {
           const DirectLightKernel kernel{sampler, {7, round, 0}, kDimLight + 4 * static_cast<std::uint32_t>(pass), 1,
                                          false, surfaces, pixels, shadow, contribution, {},
                                          {entries, counts, kCap, pass}};

@@ -60,7 +60,8 @@ void add_cut_samples(const DirectLighting& lighting, std::span<const Surface> su
                    dimension + 4 * static_cast<std::uint32_t>(pass), buffers, sum);
 }
 
-// `spp` samples below each part of the light BVH; a surface with few parts is done after as many passes.
+// `spp` samples below each part of the light BVH, and as many of the lights at infinity. A surface with few parts is done
+// after as many passes.
 void add_split_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
                        std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
                        std::span<vec3> sum) {
@@ -71,13 +72,15 @@ void add_split_samples(const DirectLighting& lighting, std::span<const Surface> 
     launch(static_cast<int>(surfaces.size()),
            SplitKernel{lighting.sampler.bvh, lighting.split, surfaces, buffers.split_entries, buffers.split_counts});
   }
-  int passes = 1;
+  const LightView& lights = lighting.sampler.lights;
+  int passes = 0;
   for (const std::uint8_t count : buffers.split_counts) passes = std::max<int>(passes, count);
+  if (!lights.directional.empty() || lights.environment.present()) ++passes;
   DirectLighting current = lighting;
   for (int s = 0; s < lighting.spp; ++s) {
     for (int pass = 0; pass < passes; ++pass) {
       const SampleNumbers numbers =
-          numbers_of_sample(lighting.rng.seed, dimension, static_cast<std::uint32_t>(s * lighting.split.cap + pass));
+          numbers_of_sample(lighting.rng.seed, dimension, static_cast<std::uint32_t>(s * passes + pass));
       current.rng.seed = numbers.seed;
       add_one_sample(current, lighting.sampler, 1 / static_cast<float>(lighting.spp), {},
                      {buffers.split_entries, buffers.split_counts, lighting.split.cap, pass}, surfaces, pixels,

@@ -71,23 +71,21 @@ struct DirectLightKernel {
     return surfaces[i].instance != kNone;
   }
 
-  // One sample below this pass's entry. Lights at infinity have one in each of the surface's passes.
+  // One sample below this pass's entry; in the pass behind the last entry, one of the lights at infinity.
   LUMI_HD void light_by_split(std::size_t i) const {
-    const int count = split.counts[i], passes = glm::max(1, count);
-    if (split.pass >= passes) return;
+    const int count = split.counts[i];
+    if (split.pass > count) return;
     const Surface& surface = surfaces[i];
     const vec4 u = random_numbers(i);
-    const ChosenGroup group = choose_group(sampler, surface, u.x);
-    const vec2 u_point(u.y, u.z);
-    if (group.group != LightGroup::kLocal) {
-      write(i, light_in_group(sampler, surface, group, {}, u_point), scale / static_cast<float>(passes));
-      return;
+    ChosenGroup group{LightGroup::kLocal, 1, u.x};
+    TreeSample chosen;
+    if (split.pass < count) {
+      const std::size_t at = i * static_cast<std::size_t>(split.cap) + static_cast<std::size_t>(split.pass);
+      chosen = sample_light_bvh(sampler.bvh, split.entries[at], surface.position, surface.normal, vec2(u.x, u.w));
+    } else {
+      group = choose_group_at_infinity(sampler, surface, u.x);
     }
-    if (split.pass >= count) return;
-    const std::uint32_t entry = split.entries[i * static_cast<std::size_t>(split.cap) + static_cast<std::size_t>(split.pass)];
-    const TreeSample chosen =
-        sample_light_bvh(sampler.bvh, entry, surface.position, surface.normal, vec2(group.r, u.w));
-    write(i, light_in_group(sampler, surface, group, chosen, u_point), scale);
+    write(i, light_in_group(sampler, surface, group, chosen, vec2(u.y, u.z)), scale);
   }
 
   // Where the walk of a surface starts; without children where this pass has no node for its pixel.

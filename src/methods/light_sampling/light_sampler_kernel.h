@@ -224,6 +224,16 @@ LUMI_HD inline ChosenGroup choose_group(const LightSampler& sampler, const Surfa
   return {};
 }
 
+// The same where local lights are sampled besides.
+LUMI_HD inline ChosenGroup choose_group_at_infinity(const LightSampler& sampler, const Surface& surface, float r) {
+  const GroupProbabilities p = group_probabilities(sampler, surface);
+  const float both = p.directional + p.environment;
+  if (!(both > 0)) return {};
+  const float share = p.directional / both;
+  if (!(p.environment > 0) || r < share) return {LightGroup::kDirectional, share, glm::min(r / share, 0x1.fffffep-1f)};
+  return {LightGroup::kEnvironment, 1 - share, 0};
+}
+
 // Among the directional lights in front of the surface, by irradiance times cosine.
 LUMI_HD inline LightSample sample_directional(const LightSampler& sampler, const Surface& surface,
                                               const ChosenGroup& group) {
