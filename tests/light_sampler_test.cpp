@@ -199,23 +199,25 @@ TEST(DirectLightKernel, BatchesOfWalksMatchSingleSamples) {
   std::vector<Ray> shadow(150);
   std::vector<vec3> contribution(150);
   const Rng rng{5, 6, 0};
-  const LightSampler sampler = world.sampler(LightChoice::kTree);
-  const DirectLightKernel kernel{sampler, rng, kDimLight, 1, false, surfaces, pixels, shadow, contribution};
-  for (int batch = 0; batch < walk_batches(150); ++batch) kernel(batch);
-  int lit = 0;
-  for (std::size_t i = 0; i < 150; ++i) {
-    vec3 expected(0);
-    if (surfaces[i].instance != kNone) {
-      const vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(kDimLight);
-      const LightSample sample = sample_light(sampler, surfaces[i], u);
-      const float cosine = glm::dot(surfaces[i].normal, sample.wi);
-      if (max_component(sample.weight) > 0 && cosine > 0)
-        expected = bsdf_eval(surfaces[i], sample.wi) * sample.weight * cosine;
+  for (const LightChoice choice : {LightChoice::kTree, LightChoice::kBvh}) {
+    const LightSampler sampler = world.sampler(choice);
+    const DirectLightKernel kernel{sampler, rng, kDimLight, 1, false, surfaces, pixels, shadow, contribution};
+    for (int batch = 0; batch < walk_batches(150); ++batch) kernel(batch);
+    int lit = 0;
+    for (std::size_t i = 0; i < 150; ++i) {
+      vec3 expected(0);
+      if (surfaces[i].instance != kNone) {
+        const vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(kDimLight);
+        const LightSample sample = sample_light(sampler, surfaces[i], u);
+        const float cosine = glm::dot(surfaces[i].normal, sample.wi);
+        if (max_component(sample.weight) > 0 && cosine > 0)
+          expected = bsdf_eval(surfaces[i], sample.wi) * sample.weight * cosine;
+      }
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(contribution[i][c], expected[c], 1e-5f * expected[c]) << i;
+      lit += max_component(contribution[i]) > 0;
     }
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(contribution[i][c], expected[c], 1e-5f * expected[c]) << i;
-    lit += max_component(contribution[i]) > 0;
+    EXPECT_GT(lit, 40);
   }
-  EXPECT_GT(lit, 40);
 }
 
 TEST(DirectLightKernel, MarksRaysThatCarryNothingAsUntraced) {

@@ -122,27 +122,48 @@ LUMI_HD inline ChildWeights<2> weigh_children(const LightBvhView& bvh, const Lig
 
 // --- walks -------------------------------------------------------------------------------------------------
 
+// Where a walk is.
+struct BvhWalk {
+  std::uint32_t link = kBvhLeaf;
+  float pdf = 0;        // 0: ended on a dead branch
+  float r = 0, r2 = 0;  // uniform numbers: for the next choice, and the one that takes over later; below 0 once it has
+
+  LUMI_HD bool ended() const { return (link & kBvhLeaf) != 0; }
+};
+
+// Down `entry`; an ended walk where there are no lights.
+LUMI_HD inline BvhWalk start_walk(const LightBvhView& bvh, std::uint32_t entry, vec2 u) {
+  if (bvh.count == 0) return {};
+  return {bvh.link(entry), 1, u.x, u.y};
+}
+
+// One step of a walk that has not ended.
+LUMI_HD LUMI_ALWAYS_INLINE void step_walk(const LightBvhView& bvh, vec3 x, vec3 n, BvhWalk& walk) {
+  constexpr float kWornOut = 0x1p-12f;
+  const LightBvhNode& node = bvh.nodes[walk.link];
+  const ChildWeights<2> children = weigh_children(bvh, node, x, n);
+  if (!(children.total > 0)) {
+    walk.link = kBvhLeaf;
+    walk.pdf = 0;
+    return;
+  }
+  const ChosenChild chosen = choose_child<2>(children, walk.r);
+  walk.pdf *= chosen.probability;
+  const bool take_over = walk.pdf < kWornOut && walk.r2 >= 0;
+  walk.r = take_over ? walk.r2 : chosen.r;
+  if (take_over) walk.r2 = -1;
+  walk.link = node.child[chosen.lane];
+}
+
+LUMI_HD inline TreeSample end_of_walk(const BvhWalk& walk) {
+  return walk.pdf > 0 ? TreeSample{walk.link & ~kBvhLeaf, walk.pdf} : TreeSample{};
+}
+
 // One walk down the subtree of `entry`.
 LUMI_HD inline TreeSample sample_light_bvh(const LightBvhView& bvh, std::uint32_t entry, vec3 x, vec3 n, vec2 u) {
-  if (bvh.count == 0) return {};
-  constexpr float kWornOut = 0x1p-12f;
-  std::uint32_t link = bvh.link(entry);
-  float pdf = 1, r = u.x;
-  bool second = false;
-  while ((link & kBvhLeaf) == 0) {
-    const LightBvhNode& node = bvh.nodes[link];
-    const ChildWeights<2> children = weigh_children(bvh, node, x, n);
-    if (!(children.total > 0)) return {};
-    const ChosenChild chosen = choose_child<2>(children, r);
-    pdf *= chosen.probability;
-    r = chosen.r;
-    if (!second && pdf < kWornOut) {
-      r = u.y;
-      second = true;
-    }
-    link = node.child[chosen.lane];
-  }
-  return {link & ~kBvhLeaf, pdf};
+  BvhWalk walk = start_walk(bvh, entry, u);
+  while (!walk.ended()) step_walk(bvh, x, n, walk);
+  return end_of_walk(walk);
 }
 
 // Probability with which sample_light_bvh returns `emitter`: the same products, multiplied in the same order. 0 for an

@@ -40,7 +40,7 @@ struct DirectLightKernel {
   std::span<Ray> shadow;
   std::span<vec3> contribution;
   CutSamples cuts = {};     // none: walks start at the root
-  SplitSamples split = {};  // likewise, kBvh
+  SplitSamples split = {};  // kBvh; none: likewise
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
@@ -49,13 +49,13 @@ struct DirectLightKernel {
       light_by_walks(first, count);
       return;
     }
+    if (sampler.choice == LightChoice::kBvh) {
+      light_by_bvh_walks(first, count);
+      return;
+    }
     for (int k = 0; k < count; ++k) {
       const std::size_t i = first + static_cast<std::size_t>(k);
-      if (!lights_up(i)) continue;
-      if (split.counts.empty())
-        write(i, sample_light(sampler, surfaces[i], random_numbers(i)), scale);
-      else
-        light_by_split(i);
+      if (lights_up(i)) write(i, sample_light(sampler, surfaces[i], random_numbers(i)), scale);
     }
   }
 
@@ -71,21 +71,62 @@ struct DirectLightKernel {
     return surfaces[i].instance != kNone;
   }
 
-  // One sample below this pass's entry; in the pass behind the last entry, one of the lights at infinity.
-  LUMI_HD void light_by_split(std::size_t i) const {
+  struct BvhStart {
+    ChosenGroup group;
+    std::uint32_t entry = kBvhRoot;
+  };
+
+  // Without splitting, any light. Otherwise one below this pass's entry, or in the pass behind the last entry one of the
+  // lights at infinity.
+  LUMI_HD BvhStart start_of_bvh_walk(std::size_t i, float r) const {
+    if (split.counts.empty()) return {choose_group(sampler, surfaces[i], r)};
     const int count = split.counts[i];
-    if (split.pass > count) return;
-    const Surface& surface = surfaces[i];
-    const vec4 u = random_numbers(i);
-    ChosenGroup group{LightGroup::kLocal, 1, u.x};
-    TreeSample chosen;
-    if (split.pass < count) {
-      const std::size_t at = i * static_cast<std::size_t>(split.cap) + static_cast<std::size_t>(split.pass);
-      chosen = sample_light_bvh(sampler.bvh, split.entries[at], surface.position, surface.normal, vec2(u.x, u.w));
-    } else {
-      group = choose_group_at_infinity(sampler, surface, u.x);
+    if (split.pass == count) return {choose_group_at_infinity(sampler, surfaces[i], r)};
+    if (split.pass > count) return {};
+    const std::size_t at = i * static_cast<std::size_t>(split.cap) + static_cast<std::size_t>(split.pass);
+    return {{LightGroup::kLocal, 1, r}, split.entries[at]};
+  }
+
+  LUMI_HD void light_by_bvh_walks(std::size_t first, int count) const {
+    ChosenGroup groups[kWalkBatch];
+    vec2 numbers[kWalkBatch];
+    std::uint32_t index[kWalkBatch];
+    BvhWalk walks[kWalkBatch];
+    int size = 0;
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k);
+      if (!lights_up(i)) continue;
+      const vec4 u = random_numbers(i);
+      const BvhStart start = start_of_bvh_walk(i, u.x);
+      if (start.group.group != LightGroup::kLocal) {
+        write(i, light_in_group(sampler, surfaces[i], start.group, {}, vec2(u.y, u.z)), scale);
+        continue;
+      }
+      groups[size] = start.group;
+      numbers[size] = vec2(u.y, u.z);
+      walks[size] = start_walk(sampler.bvh, start.entry, vec2(start.group.r, u.w));
+      index[size++] = static_cast<std::uint32_t>(i);
     }
-    write(i, light_in_group(sampler, surface, group, chosen, vec2(u.y, u.z)), scale);
+    walk_together(index, walks, size);
+    for (int k = 0; k < size; ++k)
+      write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], end_of_walk(walks[k]), numbers[k]), scale);
+  }
+
+  // A step of each in turn, so that one's arithmetic goes on while another waits.
+  LUMI_HD void walk_together(const std::uint32_t* index, BvhWalk* walks, int count) const {
+    int alive[kWalkBatch];
+    for (int k = 0; k < count; ++k) alive[k] = k;
+    for (int living = count; living > 0;) {
+      int kept = 0;
+      for (int a = 0; a < living; ++a) {
+        const int k = alive[a];
+        if (walks[k].ended()) continue;
+        step_walk(sampler.bvh, surfaces[index[k]].position, surfaces[index[k]].normal, walks[k]);
+        alive[kept++] = k;
+        prefetch(&sampler.bvh.nodes[walks[k].ended() ? 0u : walks[k].link]);
+      }
+      living = kept;
+    }
   }
 
   // Where the walk of a surface starts; without children where this pass has no node for its pixel.
