@@ -11,6 +11,7 @@
 #include "base/sampling.h"
 #include "lights/light_set.h"
 #include "lights/alias_table.h"
+#include "methods/light_bvh/light_bvh.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/light_tree/light_tree.h"
 #include "scene/scene_view.h"
@@ -163,6 +164,10 @@ class LightWorld {
     sampler.choice = choice;
     sampler.alias = alias_.view();
     sampler.tree = tree_.view();
+    if (choice == LightChoice::kBvh) {
+      bvh_.build(lights_->view(), {Hierarchy::kSaoh, Weights::kSaoh, true});
+      sampler.bvh = bvh_.view();
+    }
     return sampler;
   }
 
@@ -172,6 +177,7 @@ class LightWorld {
   SceneArrays arrays_;
   std::unique_ptr<LightSet> lights_;
   LightTree tree_;
+  mutable LightBvh bvh_;  // built when asked for
   AliasTable alias_;
 };
 

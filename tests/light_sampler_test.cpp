@@ -50,7 +50,7 @@ TEST(AliasTable, AllZeroHasNoTotal) {
   EXPECT_EQ(table.view().total, 0.0f);
 }
 
-// Uniform, power and tree against the exhaustive sum on four scenes, points inside and outside of boxes.
+// Uniform, power, tree and light BVH against the exhaustive sum on four scenes, points inside and outside of boxes.
 TEST(LightSampler, MeanOfEverySelectionIsTheExhaustiveSum) {
   constexpr int kDraws = 60000;
   for (const NamedScene& named : light_scenes()) {
@@ -58,12 +58,12 @@ TEST(LightSampler, MeanOfEverySelectionIsTheExhaustiveSum) {
     Stream random(21);
     for (const Surface& s : shading_points(5, 43)) {
       const RunningMean truth = exhaustive(world.sampler(LightChoice::kUniform), s, 300, random);
-      for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree}) {
+      for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree, LightChoice::kBvh}) {
         const LightSampler sampler = world.sampler(choice);
         RunningMean mean;
         for (int i = 0; i < kDraws; ++i) mean.add(sample_value(sample_light(sampler, s, random.next()), s));
         const double error = std::hypot(mean.standard_error(), truth.standard_error());
-        // 60 comparisons: 4.5 standard errors keep false alarms below one in a thousand.
+        // 80 comparisons: 4.5 standard errors keep false alarms below one in a thousand.
         EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * error + 1e-6 * truth.mean())
             << named.name << ", choice " << static_cast<int>(choice);
       }
@@ -75,7 +75,7 @@ TEST(LightSampler, MeanOfEverySelectionIsTheExhaustiveSum) {
 TEST(LightSampler, PdfOfASampleIsTheSamplePdf) {
   for (const NamedScene& named : light_scenes()) {
     const LightWorld world(named.scene);
-    for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree}) {
+    for (const LightChoice choice : {LightChoice::kUniform, LightChoice::kPower, LightChoice::kTree, LightChoice::kBvh}) {
       const LightSampler sampler = world.sampler(choice);
       Stream random(4);
       int compared = 0;
@@ -199,23 +199,25 @@ TEST(DirectLightKernel, BatchesOfWalksMatchSingleSamples) {
   std::vector<Ray> shadow(150);
   std::vector<vec3> contribution(150);
   const Rng rng{5, 6, 0};
-  const LightSampler sampler = world.sampler(LightChoice::kTree);
-  const DirectLightKernel kernel{sampler, rng, kDimLight, 1, false, surfaces, pixels, shadow, contribution};
-  for (int batch = 0; batch < walk_batches(150); ++batch) kernel(batch);
-  int lit = 0;
-  for (std::size_t i = 0; i < 150; ++i) {
-    vec3 expected(0);
-    if (surfaces[i].instance != kNoId) {
-      const vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(kDimLight);
-      const LightSample sample = sample_light(sampler, surfaces[i], u);
-      const float cosine = glm::dot(surfaces[i].normal, sample.wi);
-      if (max_component(sample.weight) > 0 && cosine > 0)
-        expected = bsdf_eval(surfaces[i], sample.wi) * sample.weight * cosine;
+  for (const LightChoice choice : {LightChoice::kTree, LightChoice::kBvh}) {
+    const LightSampler sampler = world.sampler(choice);
+    const DirectLightKernel kernel{sampler, rng, kDimLight, 1, false, surfaces, pixels, shadow, contribution};
+    for (int batch = 0; batch < walk_batches(150); ++batch) kernel(batch);
+    int lit = 0;
+    for (std::size_t i = 0; i < 150; ++i) {
+      vec3 expected(0);
+      if (surfaces[i].instance != kNoId) {
+        const vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(kDimLight);
+        const LightSample sample = sample_light(sampler, surfaces[i], u);
+        const float cosine = glm::dot(surfaces[i].normal, sample.wi);
+        if (max_component(sample.weight) > 0 && cosine > 0)
+          expected = bsdf_eval(surfaces[i], sample.wi) * sample.weight * cosine;
+      }
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(contribution[i][c], expected[c], 1e-5f * expected[c]) << i;
+      lit += max_component(contribution[i]) > 0;
     }
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(contribution[i][c], expected[c], 1e-5f * expected[c]) << i;
-    lit += max_component(contribution[i]) > 0;
+    EXPECT_GT(lit, 40);
   }
-  EXPECT_GT(lit, 40);
 }
 
 TEST(DirectLightKernel, MarksRaysThatCarryNothingAsUntraced) {

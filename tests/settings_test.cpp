@@ -144,6 +144,18 @@ TEST(Settings, CheckRefusesWhatMakesNoSense) {
   expect_contains(refusal([](Settings& s) { s.time = INFINITY; }), "time");
   expect_contains(refusal([](Settings& s) { s.direct.width = 5; }), "direct.width");
   expect_contains(refusal([](Settings& s) { s.direct.hierarchy = Hierarchy::kNone; }), "direct.hierarchy");
+  expect_contains(refusal([](Settings& s) { s.direct.weights = Weights::kSaoh; }), "direct.weights 'saoh' needs");
+  expect_contains(refusal([](Settings& s) { s.direct.split = 0.5f; }), "direct.split needs");
+  expect_contains(refusal([](Settings& s) {
+                    s.direct.hierarchy = Hierarchy::kSaoh;
+                    s.direct.selection = Selection::kCut;
+                  }),
+                  "cuts the perfect tree only");
+  expect_contains(refusal([](Settings& s) {
+                    s = make_preset("ats");
+                    s.direct.mis = true;
+                  }),
+                  "does not combine with splitting");
   expect_contains(refusal([](Settings& s) { s.width = s.height = 65536; }), "too large");
   expect_contains(refusal([](Settings& s) { s.pixel_bounds = {{0, 9, 0, 721}}; }), "pixel_bounds");
   expect_contains(refusal([](Settings& s) { s.pixel_bounds = {{4, 4, 0, 7}}; }), "pixel_bounds");

@@ -15,8 +15,8 @@
 namespace lumigrove {
 
 // The axes of the space of methods (docs/papers.md); the table in registry.cpp holds their names.
-enum class Hierarchy : std::uint8_t { kNone, kPerfect };
-enum class Weights : std::uint8_t { kMinMax };
+enum class Hierarchy : std::uint8_t { kNone, kPerfect, kSaoh, kAgglomerative };
+enum class Weights : std::uint8_t { kMinMax, kSaoh };
 enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut };
 enum class CutBound : std::uint8_t { kNearest, kExact, kChildren };
 enum class Transport : std::uint8_t { kNone, kPath, kVpl };
@@ -39,6 +39,9 @@ struct DirectSettings {
   int cut_interleave = 1;       // m: the pixels of m x m share out a cut's nodes
   float cut_floor = 0.001f;     // least distance in the bound, in units of the diagonal of the lights' box
   CutBound cut_bound = CutBound::kChildren;
+  // Adaptive tree splitting (kSaoh, kAgglomerative)
+  float split = 0;              // threshold: one sample below each part of a split tree; 0 = no splitting
+  int split_cap = 16;           // most parts, at most 64
 };
 
 // Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D.

@@ -69,6 +69,7 @@ PathTracing make_path_tracing(const Settings& settings, const DirectLighting& di
   tracing.first_spp = direct.spp;
   tracing.lighting.spp = 1;  // direct.spp is for what the camera sees, and so are cuts
   tracing.lighting.use_cuts = false;
+  tracing.lighting.use_split = false;
   tracing.max_bounces = settings.indirect.transport == Transport::kPath ? settings.indirect.max_bounces : 0;
   tracing.roulette_start = settings.indirect.roulette_start;
   tracing.light_scale = settings.light_scale;
@@ -82,6 +83,7 @@ Gather make_gather(const Settings& settings, const DirectLighting& direct, const
   gather.direct.spp = 1;
   gather.direct.mis = false;
   gather.direct.use_cuts = false;
+  gather.direct.use_split = false;
   return gather;
 }
 
@@ -182,6 +184,11 @@ constexpr float kSubstituteOffset = 2.2e-3f;
 // Distance that stands for none where kInBox leaves it out, in units of D.
 constexpr float kInsideDistance = 0.2155f;
 
+bool uses_bvh(const DirectSettings& s) {
+  return s.selection == Selection::kRoot &&
+         (s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative);
+}
+
 }  // namespace
 
 // --- the world ---------------------------------------------------------------------------------------------
@@ -197,7 +204,7 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   LightSet lights(scene, arrays);
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
-      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, std::move(camera), {}, {}, {}});
+      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, {}, std::move(camera), {}, {}, {}});
   build_lights(*world, settings, stats);
   return world;
 }
@@ -208,7 +215,12 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   stats.emitters = lights.emitters.size();
   stats.structures.push_back(
       {"light set", world.lights.gather_ms(), world.lights.bytes(), lights.emitters.size()});
-  if (settings.direct.selection == Selection::kRoot || settings.direct.selection == Selection::kCut) {
+  if (uses_bvh(settings.direct)) {
+    const Hierarchy builder = settings.direct.hierarchy;
+    world.bvh.build(lights, {builder, settings.direct.weights, settings.direct.cones});
+    stats.structures.push_back({builder == Hierarchy::kSaoh ? "SAOH tree" : "agglomerative tree", world.bvh.build_ms(),
+                                world.bvh.bytes(), world.bvh.view().count});
+  } else if (settings.direct.selection == Selection::kRoot || settings.direct.selection == Selection::kCut) {
     world.tree.build(lights, {settings.direct.width, settings.direct.cones, settings.direct.mis});
     stats.structures.push_back(
         {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
@@ -292,6 +304,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   direct.sampler.lights = world.lights.view();
   direct.sampler.alias = world.alias.view();
   direct.sampler.tree = world.tree.view();
+  direct.sampler.bvh = world.bvh.view();
   switch (settings.direct.selection) {
     case Selection::kUniform:
       direct.sampler.choice = LightChoice::kUniform;
@@ -300,7 +313,9 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
       direct.sampler.choice = LightChoice::kPower;
       break;
     case Selection::kRoot:
-      direct.sampler.choice = LightChoice::kTree;
+      direct.sampler.choice = uses_bvh(settings.direct) ? LightChoice::kBvh : LightChoice::kTree;
+      direct.use_split = uses_bvh(settings.direct) && settings.direct.split > 0;
+      direct.split = {settings.direct.split, settings.direct.split_cap};
       break;
     case Selection::kCut: {
       direct.sampler.choice = LightChoice::kTree;
@@ -353,6 +368,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     sum.film_ms += b.film_ms;
     sum.primary_rays += b.primary_rays;
     sum.direct_buffers.cut_ms += b.direct_buffers.cut_ms;
+    sum.direct_buffers.split_ms += b.direct_buffers.split_ms;
     sum.direct_buffers.select_ms += b.direct_buffers.select_ms;
     sum.direct_buffers.trace_ms += b.direct_buffers.trace_ms;
     sum.direct_buffers.rays += b.direct_buffers.rays;
@@ -363,6 +379,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "camera rays", sum.camera_ms, 0);
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
   add_pass(stats, "surfaces", sum.surface_ms, 0);
+  if (direct.use_split) add_pass(stats, "splitting", sum.direct_buffers.split_ms, 0);
   if (direct.use_cuts) add_pass(stats, "cuts", sum.direct_buffers.cut_ms, 0);
   add_pass(stats, "light selection", sum.direct_buffers.select_ms, 0);
   add_pass(stats, "shadow rays", sum.direct_buffers.trace_ms, sum.direct_buffers.rays);

@@ -8,6 +8,7 @@
 #include "lights/light_set.h"
 #include "lumigrove/renderer.h"
 #include "lights/alias_table.h"
+#include "methods/light_bvh/light_bvh.h"
 #include "methods/light_sampling/direct_lighting.h"
 #include "methods/light_tree/light_tree.h"
 #include "methods/substitute_tree/substitute_tree.h"
@@ -26,7 +27,8 @@ struct World {
   SceneArrays arrays;
   Tracer tracer;
   LightSet lights;
-  LightTree tree;    // built when direct.hierarchy is perfect and direct.selection is root
+  LightTree tree;    // built when direct.hierarchy is perfect and direct.selection is root or cut
+  LightBvh bvh;      // built when direct.hierarchy is saoh or agglomerative and direct.selection is root
   AliasTable alias;  // built when direct.selection is power
   CameraInstance camera;
   // When indirect.transport is vpl:

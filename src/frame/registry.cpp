@@ -10,6 +10,7 @@
 #include "base/nearest.h"
 #include "frame/value_text.h"
 #include "lumigrove/settings.h"
+#include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 
 namespace lumigrove {
@@ -224,12 +225,17 @@ std::vector<Setting> direct_rows() {
           "from every node of a cut"),
       choice(
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
-          vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone}, {"perfect", Hierarchy::kPerfect}},
-          "Hierarchy over the emitters"),
+          vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
+                                          {"perfect", Hierarchy::kPerfect},
+                                          {"saoh", Hierarchy::kSaoh},
+                                          {"agglomerative", Hierarchy::kAgglomerative}},
+          "Hierarchy over the emitters: halves of their Morton order, split by the surface-area-orientation heuristic, or "
+          "merged from nearest pairs (slow to build); the last two are binary"),
       choice(
           "direct.weights", [](auto& s) -> auto& { return s.direct.weights; },
-          vector<pair<string, Weights>>{{"min-max", Weights::kMinMax}},
-          "Weights of a node's children: mean of those at least and at greatest distance"),
+          vector<pair<string, Weights>>{{"min-max", Weights::kMinMax}, {"saoh", Weights::kSaoh}},
+          "Weights of a node's children: mean of those at least and at greatest distance, or at the centre with bounds of the "
+          "angles (hierarchies saoh and agglomerative)"),
       choice(
           "direct.width", [](auto& s) -> auto& { return s.direct.width; },
           vector<pair<string, int>>{{"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}},
@@ -259,6 +265,13 @@ std::vector<Setting> direct_rows() {
                                          {"children", CutBound::kChildren}},
           "Error of a cut's node: by one box around its lights, with the cosine of the box's nearest point or an exact "
           "bound of it; or the sum over the boxes inside it"),
+      real(
+          "direct.split", [](auto& s) -> auto& { return s.direct.split; }, {0, 1}, "",
+          "Threshold of adaptive tree splitting: a light sample below each part of the tree; larger = more parts, 0 = no "
+          "splitting (hierarchies saoh and agglomerative)"),
+      integer(
+          "direct.split_cap", [](auto& s) -> auto& { return s.direct.split_cap; }, {1, kMaxSplit}, "samples",
+          "Most parts that the tree is split into at a surface"),
   };
 }
 
@@ -419,6 +432,19 @@ void check_cuts(const DirectSettings& s) {
   if (s.mis) throw Error("direct.mis does not combine with cuts; set direct.selection 'root' or direct.mis false");
 }
 
+void check_light_bvh(const DirectSettings& s) {
+  if (s.selection == Selection::kCut && s.hierarchy != Hierarchy::kPerfect)
+    throw Error("direct.selection 'cut' cuts the perfect tree only; set direct.hierarchy 'perfect' or direct.selection "
+                "'root'");
+  if (s.selection != Selection::kRoot && s.selection != Selection::kCut) return;
+  const bool bvh = s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative;
+  if (s.weights == Weights::kSaoh && !bvh)
+    throw Error("direct.weights 'saoh' needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 'min-max'");
+  if (s.split > 0 && !bvh)
+    throw Error("direct.split needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 0");
+  if (s.split > 0 && s.mis) throw Error("direct.mis does not combine with splitting; set direct.split 0 or direct.mis false");
+}
+
 void check_vpls(const IndirectSettings& s) {
   if (s.transport != Transport::kVpl) return;
   if (s.selection == Selection::kRoot && s.hierarchy == IndirectHierarchy::kNone)
@@ -450,6 +476,18 @@ const std::vector<PresetInfo>& presets() {
         {"direct.weights", "min-max"},
         {"direct.spp", "8"},
         {"direct.cut_share", "8"},
+        {"indirect.transport", "none"}}},
+      {"ats",
+       "Adaptive tree splitting: a light BVH built by the surface-area-orientation heuristic, split near each surface, a "
+       "sample below each part; direct light only",
+       "A. Conty Estevez, C. Kulla: Importance Sampling of Many Lights with Adaptive Tree Splitting. Proc. ACM Comput. "
+       "Graph. Interact. Tech. 1(2), 2018; P. Moreau, M. Pharr, P. Clarberg: Dynamic Many-Light Sampling for Real-Time Ray "
+       "Tracing. HPG 2019",
+       {{"direct.selection", "root"},
+        {"direct.hierarchy", "saoh"},
+        {"direct.weights", "saoh"},
+        {"direct.split", "0.75"},
+        {"direct.split_cap", "16"},
         {"indirect.transport", "none"}}},
       {"power",
        "Emitters by flux, from an alias table; direct light only",
@@ -542,6 +580,7 @@ void check(const Settings& s) {
   if (s.direct.selection == Selection::kRoot && s.direct.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'root' walks a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
   check_cuts(s.direct);
+  check_light_bvh(s.direct);
   check_vpls(s.indirect);
 }
 

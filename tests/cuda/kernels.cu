@@ -16,6 +16,7 @@
 #include "lights/light_set.h"
 #include "lights/unoccluded_kernel.h"
 #include "lights/vpl.h"
+#include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
@@ -102,6 +103,7 @@ template void cuda::launch<MortonKernel>(int, const MortonKernel&, cudaStream_t)
 template void cuda::launch<LeafNodeKernel<16>>(int, const LeafNodeKernel<16>&, cudaStream_t);
 template void cuda::launch<InnerNodeKernel<16>>(int, const InnerNodeKernel<16>&, cudaStream_t);
 template void cuda::launch<CutKernel>(int, const CutKernel&, cudaStream_t);
+template void cuda::launch<SplitKernel>(int, const SplitKernel&, cudaStream_t);
 template void cuda::launch<DirectLightKernel>(int, const DirectLightKernel&, cudaStream_t);
 template void cuda::launch<AddUnoccludedKernel>(int, const AddUnoccludedKernel&, cudaStream_t);
 template void cuda::launch<PathStartKernel>(int, const PathStartKernel&, cudaStream_t);

@@ -1,5 +1,7 @@
 #include "methods/light_sampling/direct_lighting.h"
 
+#include <algorithm>
+
 #include "base/stopwatch.h"
 #include "device/device.h"
 #include "lights/unoccluded_kernel.h"
@@ -8,9 +10,19 @@
 namespace lumigrove {
 namespace {
 
+// Every light's sample takes a block of four dimensions; samples beyond the vertex's share continue under another seed
+// rather than into the next vertex's numbers.
+struct SampleNumbers {
+  std::uint32_t seed, dimension;
+};
+SampleNumbers numbers_of_sample(std::uint32_t seed, std::uint32_t dimension, std::uint32_t sample) {
+  constexpr std::uint32_t kBlocks = (kDimBsdf - kDimLight) / 4;
+  return {seed + 0x9e3779b9u * (sample / kBlocks), dimension + 4 * (sample % kBlocks)};
+}
+
 // `scale`: 1 / samples.
 void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler, float scale, const CutSamples& cuts,
-                    int stratum, int strata,
+                    const SplitSamples& split, Stratum stratum,
                     std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
                     std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   const int count = static_cast<int>(surfaces.size());
@@ -18,7 +30,7 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
     const ScopedTimer timer(buffers.select_ms);
     launch(walk_batches(count),
            DirectLightKernel{sampler, lighting.rng, dimension, scale, lighting.mis, surfaces, pixels,
-                             buffers.shadow, buffers.contribution, cuts, stratum, strata},
+                             buffers.shadow, buffers.contribution, cuts, stratum, split},
            kLaunchGrain / kWalkBatch);
   }
   {
@@ -44,8 +56,37 @@ void add_cut_samples(const DirectLighting& lighting, std::span<const Surface> su
   const float interleave2 = static_cast<float>(lookup.interleave * lookup.interleave);
   for (int pass = 0; pass < passes; ++pass)
     add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(passes),
-                   {buffers.cuts, lookup, pass, interleave2}, 0, 1, surfaces, pixels,
+                   {buffers.cuts, lookup, pass, interleave2}, {}, {}, surfaces, pixels,
                    dimension + 4 * static_cast<std::uint32_t>(pass), buffers, sum);
+}
+
+// `spp` samples below each part of the light BVH, and as many of the lights at infinity. A surface with few parts is done
+// after as many passes.
+void add_split_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
+                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
+                       std::span<vec3> sum) {
+  {
+    const ScopedTimer timer(buffers.split_ms);
+    buffers.split_entries.resize(surfaces.size() * static_cast<std::size_t>(lighting.split.cap));
+    buffers.split_counts.resize(surfaces.size());
+    launch(static_cast<int>(surfaces.size()),
+           SplitKernel{lighting.sampler.bvh, lighting.split, surfaces, buffers.split_entries, buffers.split_counts});
+  }
+  const LightView& lights = lighting.sampler.lights;
+  int passes = 0;
+  for (const std::uint8_t count : buffers.split_counts) passes = std::max<int>(passes, count);
+  if (!lights.directional.empty() || lights.environment.present()) ++passes;
+  DirectLighting current = lighting;
+  for (int s = 0; s < lighting.spp; ++s) {
+    for (int pass = 0; pass < passes; ++pass) {
+      const SampleNumbers numbers =
+          numbers_of_sample(lighting.rng.seed, dimension, static_cast<std::uint32_t>(s * passes + pass));
+      current.rng.seed = numbers.seed;
+      add_one_sample(current, lighting.sampler, 1 / static_cast<float>(lighting.spp), {},
+                     {buffers.split_entries, buffers.split_counts, lighting.split.cap, pass}, {}, surfaces,
+                     pixels, numbers.dimension, buffers, sum);
+    }
+  }
 }
 
 }  // namespace
@@ -60,9 +101,10 @@ void add_direct_light(const DirectLighting& lighting, std::span<const Surface> s
     add_cut_samples(lighting, surfaces, pixels, dimension, buffers, sum);
     return;
   }
-  // Every light's sample takes a block of four dimensions; samples beyond the vertex's share continue under
-  // another seed rather than into the next vertex's numbers.
-  constexpr std::uint32_t kBlocks = (kDimBsdf - kDimLight) / 4;
+  if (lighting.use_split) {
+    add_split_samples(lighting, surfaces, pixels, dimension, buffers, sum);
+    return;
+  }
   DirectLighting current = lighting;
   const std::uint32_t lights = lighting.all ? light_count(lighting.sampler.lights) : 1;
   for (std::uint32_t light = 0; light < lights; ++light) {
@@ -72,11 +114,12 @@ void add_direct_light(const DirectLighting& lighting, std::span<const Surface> s
       sampler.one = light;
     }
     for (int s = 0; s < lighting.spp; ++s) {
-      const std::uint32_t block =
-          light * static_cast<std::uint32_t>(lighting.spp) + static_cast<std::uint32_t>(s);
-      current.rng.seed = lighting.rng.seed + 0x9e3779b9u * (block / kBlocks);
-      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, lighting.all ? 0 : s, lighting.all ? 1 : lighting.spp, surfaces, pixels,
-                     dimension + 4 * (block % kBlocks), buffers, sum);
+      const SampleNumbers numbers = numbers_of_sample(
+          lighting.rng.seed, dimension, light * static_cast<std::uint32_t>(lighting.spp) + static_cast<std::uint32_t>(s));
+      current.rng.seed = numbers.seed;
+      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, {},
+                     lighting.all ? Stratum{} : Stratum{s, lighting.spp}, surfaces, pixels,
+                     numbers.dimension, buffers, sum);
     }
   }
 }

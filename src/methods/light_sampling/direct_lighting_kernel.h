@@ -20,6 +20,19 @@ struct CutSamples {
   float scale = 1;  // m^2: interleaved pixels sample only their share of the nodes
 };
 
+// The split sets of a light BVH (SplitKernel), and which entry of each is sampled.
+struct SplitSamples {
+  std::span<const std::uint32_t> entries;
+  std::span<const std::uint8_t> counts;
+  int cap = 0, pass = 0;
+};
+
+// Of the samples that a surface takes one after another, each chooses its light in its own part of [0,1): neighbours in a
+// tree's order are neighbours in space.
+struct Stratum {
+  int index = 0, count = 1;
+};
+
 // surfaces[i] -> shadow[i], contribution[i] (radiance towards wo if unoccluded). Rays that carry nothing are
 // marked untraced. Surfaces take their random numbers from `dimension`. One call does kWalkBatch surfaces, so that
 // their walks down the tree go together.
@@ -33,15 +46,19 @@ struct DirectLightKernel {
   std::span<const std::uint32_t> pixels;
   std::span<Ray> shadow;
   std::span<vec3> contribution;
-  CutSamples cuts = {};  // none: walks start at the root
-  // Of the samples that a surface takes one after another, this one chooses its light in its own part of [0,1).
-  int stratum = 0, strata = 1;
+  CutSamples cuts = {};     // none: walks start at the root
+  Stratum stratum = {};
+  SplitSamples split = {};  // kBvh; none: walks start at the root
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
     const int count = static_cast<int>(glm::min<std::size_t>(kWalkBatch, surfaces.size() - first));
     if (sampler.choice == LightChoice::kTree) {
       light_by_walks(first, count);
+      return;
+    }
+    if (sampler.choice == LightChoice::kBvh) {
+      light_by_bvh_walks(first, count);
       return;
     }
     for (int k = 0; k < count; ++k) {
@@ -53,7 +70,7 @@ struct DirectLightKernel {
  private:
   LUMI_HD vec4 random_numbers(std::size_t i) const {
     vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(dimension);
-    u.x = (static_cast<float>(stratum) + u.x) / static_cast<float>(strata);
+    u.x = (static_cast<float>(stratum.index) + u.x) / static_cast<float>(stratum.count);
     u.x = glm::min(u.x, 0x1.fffffep-1f);
     return u;
   }
@@ -63,6 +80,64 @@ struct DirectLightKernel {
     shadow[i].tmax = -1;
     contribution[i] = vec3(0);
     return surfaces[i].instance != kNoId;
+  }
+
+  struct BvhStart {
+    ChosenGroup group;
+    std::uint32_t entry = kBvhRoot;
+  };
+
+  // Without splitting, any light. Otherwise one below this pass's entry, or in the pass behind the last entry one of the
+  // lights at infinity.
+  LUMI_HD BvhStart start_of_bvh_walk(std::size_t i, float r) const {
+    if (split.counts.empty()) return {choose_group(sampler, surfaces[i], r)};
+    const int count = split.counts[i];
+    if (split.pass == count) return {choose_group_at_infinity(sampler, surfaces[i], r)};
+    if (split.pass > count) return {};
+    const std::size_t at = i * static_cast<std::size_t>(split.cap) + static_cast<std::size_t>(split.pass);
+    return {{LightGroup::kLocal, 1, r}, split.entries[at]};
+  }
+
+  LUMI_HD void light_by_bvh_walks(std::size_t first, int count) const {
+    ChosenGroup groups[kWalkBatch];
+    vec2 numbers[kWalkBatch];
+    std::uint32_t index[kWalkBatch];
+    BvhWalk walks[kWalkBatch];
+    int size = 0;
+    for (int k = 0; k < count; ++k) {
+      const std::size_t i = first + static_cast<std::size_t>(k);
+      if (!lights_up(i)) continue;
+      const vec4 u = random_numbers(i);
+      const BvhStart start = start_of_bvh_walk(i, u.x);
+      if (start.group.group != LightGroup::kLocal) {
+        write(i, light_in_group(sampler, surfaces[i], start.group, {}, vec2(u.y, u.z)), scale);
+        continue;
+      }
+      groups[size] = start.group;
+      numbers[size] = vec2(u.y, u.z);
+      walks[size] = start_walk(sampler.bvh, start.entry, vec2(start.group.r, u.w));
+      index[size++] = static_cast<std::uint32_t>(i);
+    }
+    walk_together(index, walks, size);
+    for (int k = 0; k < size; ++k)
+      write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], end_of_walk(walks[k]), numbers[k]), scale);
+  }
+
+  // A step of each in turn, so that one's arithmetic goes on while another waits.
+  LUMI_HD void walk_together(const std::uint32_t* index, BvhWalk* walks, int count) const {
+    int alive[kWalkBatch];
+    for (int k = 0; k < count; ++k) alive[k] = k;
+    for (int living = count; living > 0;) {
+      int kept = 0;
+      for (int a = 0; a < living; ++a) {
+        const int k = alive[a];
+        if (walks[k].ended()) continue;
+        step_walk(sampler.bvh, surfaces[index[k]].position, surfaces[index[k]].normal, walks[k]);
+        alive[kept++] = k;
+        prefetch(&sampler.bvh.nodes[walks[k].ended() ? 0u : walks[k].link]);
+      }
+      living = kept;
+    }
   }
 
   // Where the walk of a surface starts; without children where this pass has no node for its pixel.

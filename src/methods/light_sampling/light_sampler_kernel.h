@@ -1,12 +1,12 @@
 // Method      Chooses one light for a surface point, a point on it, and says with what probability:
 // uniformly, by
-//             power, or by a walk down the light tree; directional lights and the environment beside the
+//             power, or by a walk down the light tree or a light BVH; directional lights and the environment beside the
 //             local ones.
 // Paper       none of its own; P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting
 //             Calculations", ACM TOG 15(1), 1996 for the choice by power.
 // Symbols     p(group) -> group_probabilities -> local emitters, directional lights or environment, given the
 // surface
-//             p(light | group) -> AliasView::pdf, 1/n or pdf_light_tree
+//             p(light | group) -> AliasView::pdf, 1/n, pdf_light_tree or pdf_light_bvh
 //             p(y | light) -> EmitterPoint::area_to_solid / A -> per solid angle at the surface
 // Equations   contribution = f * cos * incident / (p(group) p(light | group) p(y | light))
 // Departures  none
@@ -20,6 +20,7 @@
 #include "lights/emitter.h"
 #include "lights/environment.h"
 #include "lights/alias_table.h"
+#include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "scene/surface.h"
 #include "trace/ray.h"
@@ -35,7 +36,7 @@ struct LightSample {
   float distance = 0;                  // metres; infinite for lights at infinity
 };
 
-enum class LightChoice : std::uint8_t { kUniform, kPower, kTree, kOne };
+enum class LightChoice : std::uint8_t { kUniform, kPower, kTree, kOne, kBvh };
 
 struct LightSampler {
   SceneView scene;
@@ -43,6 +44,7 @@ struct LightSampler {
   LightChoice choice = LightChoice::kUniform;
   AliasView alias;        // kPower: over emitter_flux
   LightTreeView tree;     // kTree
+  LightBvhView bvh;       // kBvh
   std::uint32_t one = 0;  // kOne: emitters, then directional lights, then the environment
 };
 
@@ -124,6 +126,8 @@ LUMI_HD inline TreeSample choose_emitter(const LightSampler& sampler, const Surf
     }
     case LightChoice::kTree:
       return sample_tree(sampler.tree, surface.position, surface.normal, u);
+    case LightChoice::kBvh:
+      return sample_light_bvh(sampler.bvh, kBvhRoot, surface.position, surface.normal, u);
     case LightChoice::kOne:
       break;
   }
@@ -140,6 +144,8 @@ LUMI_HD inline float pdf_choose_emitter(const LightSampler& sampler, const Surfa
       return sampler.alias.pdf(emitter_flux(sampler.lights, emitter));
     case LightChoice::kTree:
       return pdf_tree(sampler.tree, whole_tree(sampler.tree), surface.position, surface.normal, emitter);
+    case LightChoice::kBvh:
+      return pdf_light_bvh(sampler.bvh, kBvhRoot, surface.position, surface.normal, emitter);
     case LightChoice::kOne:
       break;
   }
@@ -216,6 +222,16 @@ LUMI_HD inline ChosenGroup choose_group(const LightSampler& sampler, const Surfa
   r -= p.directional;
   if (p.environment > 0) return choose(LightGroup::kEnvironment, p.environment);
   return {};
+}
+
+// The same where local lights are sampled besides.
+LUMI_HD inline ChosenGroup choose_group_at_infinity(const LightSampler& sampler, const Surface& surface, float r) {
+  const GroupProbabilities p = group_probabilities(sampler, surface);
+  const float both = p.directional + p.environment;
+  if (!(both > 0)) return {};
+  const float share = p.directional / both;
+  if (!(p.environment > 0) || r < share) return {LightGroup::kDirectional, share, glm::min(r / share, 0x1.fffffep-1f)};
+  return {LightGroup::kEnvironment, 1 - share, 0};
 }
 
 // Among the directional lights in front of the surface, by irradiance times cosine.
