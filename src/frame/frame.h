@@ -10,6 +10,7 @@
 #include "lights/alias_table.h"
 #include "methods/light_sampling/direct_lighting.h"
 #include "methods/light_tree/light_tree.h"
+#include "methods/light_tree/two_level_tree.h"
 #include "methods/substitute_tree/substitute_tree.h"
 #include "methods/vpl/vpl.h"
 #include "methods/vpl_sampling/indirect_lighting.h"
@@ -26,7 +27,8 @@ struct World {
   SceneArrays arrays;
   Tracer tracer;
   LightSet lights;
-  LightTree tree;    // built when direct.hierarchy is perfect and direct.selection is root
+  LightTree tree;          // built when direct.hierarchy is perfect and direct.selection is root or cut
+  TwoLevelTree two_level;  // built when direct.hierarchy is two-level and direct.selection is root
   AliasTable alias;  // built when direct.selection is power
   CameraInstance camera;
   // When indirect.transport is vpl:

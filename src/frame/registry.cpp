@@ -224,8 +224,9 @@ std::vector<Setting> direct_rows() {
           "from every node of a cut"),
       choice(
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
-          vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone}, {"perfect", Hierarchy::kPerfect}},
-          "Hierarchy over the emitters"),
+          vector<pair<string, Hierarchy>>{
+              {"none", Hierarchy::kNone}, {"perfect", Hierarchy::kPerfect}, {"two-level", Hierarchy::kTwoLevel}},
+          "Hierarchy over the emitters; two-level = a tree for every mesh, shared by its instances, and one over these"),
       choice(
           "direct.weights", [](auto& s) -> auto& { return s.direct.weights; },
           vector<pair<string, Weights>>{{"min-max", Weights::kMinMax}},
@@ -410,6 +411,8 @@ void check_cuts(const DirectSettings& s) {
   if (s.selection != Selection::kCut) return;
   if (s.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'cut' cuts a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
+  if (s.hierarchy == Hierarchy::kTwoLevel)
+    throw Error("direct.selection 'cut' cuts one tree, but direct.hierarchy is 'two-level'; use 'perfect'");
   if (s.spp > kMaxCut)
     throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
   if (s.mis) throw Error("direct.mis does not combine with cuts; set direct.selection 'root' or direct.mis false");

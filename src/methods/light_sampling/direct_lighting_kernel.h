@@ -32,7 +32,7 @@ struct DirectLightKernel {
   std::span<const std::uint32_t> pixels;
   std::span<Ray> shadow;
   std::span<vec3> contribution;
-  CutSamples cuts;  // none: walks start at the root
+  CutSamples cuts = {};  // none: walks start at the root
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
@@ -122,7 +122,7 @@ struct DirectLightKernel {
         members[size++] = k;
       }
       TreeSample samples[kWalkBatch];
-      sample_trees(sampler.tree, starts[leader], points, size, samples);
+      sample_emitters(sampler, starts[leader], points, size, samples);
       for (int k = 0; k < size; ++k) chosen[members[k]] = samples[k];
     }
   }
