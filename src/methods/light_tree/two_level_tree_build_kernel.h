@@ -155,10 +155,13 @@ struct TreeInstanceKernel {
     const float determinant = glm::dot(linear[0], cofactors[0]);
     const mat3 inverse = glm::transpose(cofactors) * (1 / determinant);
     const float condition = norm(linear) * norm(inverse) * (1.0f / 3);
-    if (!(condition < kWorst) || !is_finite(1 / largest)) return;
+    const vec3 far = glm::max(glm::abs(mesh.box.lo), glm::abs(mesh.box.hi));
+    if (!(condition < kWorst) || !is_finite(1 / largest)) {
+      instance.slack = 1000 * max_component(far);
+      return;
+    }
     instance.to_mesh = inverse;
     instance.normal_to_mesh = glm::transpose(linear) * (1 / largest);
-    const vec3 far = glm::max(glm::abs(mesh.box.lo), glm::abs(mesh.box.hi));
     instance.slack_per_length = 4e-7f * condition;
     instance.slack = rounding * norm(inverse) + instance.slack_per_length * (far.x + far.y + far.z);
     instance.cones = use_cones && condition < kWorstForCones && instance.slack <= mesh.tolerance;

@@ -14,7 +14,7 @@
 //             probability stays positive and exact, but samples are chosen less well. The instance's own share is right
 //             to the root mean square of its area scales.
 //             x' is lowered under its tangent plane by what rounding can make of the mesh in the world. Instances whose
-//             map has no (or hardly an) inverse are walked by intensity alone. Cones of a mesh are widened for
+//             map has no (or hardly an) inverse are walked from far away, which is by intensity alone. Cones of a mesh are widened for
 //             instances up to about 600 times its size away from the origin; beyond, they are not used.
 //             A mesh of one triangle needs no second walk. Triangles of no area in their mesh do not shine.
 // Estimator   unbiased: every emitter that can contribute at x has positive probability, and the probability returned is
@@ -35,7 +35,7 @@ struct alignas(64) TreeInstance {
   mat3 to_mesh = mat3(0);         // L^-1; 0 where there is none
   mat3 normal_to_mesh = mat3(0);  // L^T times a positive number; 0 likewise
   vec3 origin = vec3(0);          // t
-  float slack = 0;                // how far x' is lowered, m of the mesh's space
+  float slack = 0;                // how far x' is lowered, m of the mesh's space; without L^-1 how far away it is put
   float slack_per_length = 0;     // and for each metre of x'
   std::uint32_t first = 0;        // its first emitter
   std::uint32_t tree = kNone;     // kNone: a point or spot light, or an instance of a single triangle
@@ -60,10 +60,11 @@ struct MeshSpacePoint {
 };
 
 LUMI_HD inline MeshSpacePoint to_mesh_space(const TreeInstance& instance, vec3 x, vec3 n) {
-  const vec3 position = instance.to_mesh * (x - instance.origin);
   const vec3 normal = instance.normal_to_mesh * n;
   const float squared = length_squared(normal);
-  const vec3 unit = squared > 0 ? normal * (1 / glm::sqrt(squared)) : vec3(0);
+  if (!(squared > 0)) return {vec3(instance.slack), vec3(0)};  // no inverse
+  const vec3 position = instance.to_mesh * (x - instance.origin);
+  const vec3 unit = normal * (1 / glm::sqrt(squared));
   const vec3 apart = glm::abs(position);
   return {position - unit * (instance.slack + instance.slack_per_length * (apart.x + apart.y + apart.z)), unit};
 }
