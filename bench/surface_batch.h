@@ -49,10 +49,11 @@ struct SurfaceBatch {
   // One light sample at every surface: choice, point, shading, shadow ray; nothing is traced.
   void sample() {
     const DirectLighting direct = make_direct_lighting(*world, settings, 0);
-    launch(walk_batches(static_cast<int>(surfaces.size())),
-           DirectLightKernel{direct.sampler, direct.rng, kDimLight, 1.0f, false, surfaces, pixels, shadow,
-                             contribution, {}},
-           kLaunchGrain / kWalkBatch);
+    launch(
+        walk_batches(static_cast<int>(surfaces.size())),
+        DirectLightKernel{
+            direct.sampler, direct.rng, kDimLight, 1.0f, false, surfaces, pixels, shadow, contribution, {}},
+        kLaunchGrain / kWalkBatch);
   }
 };
 

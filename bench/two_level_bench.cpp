@@ -16,7 +16,8 @@ Result build_two_level(const Options& options) {
   const LightTree::Options tree{settings.direct.width, settings.direct.cones, false};
   const double first_ms = world->two_level.mesh_ms();
   const PairTimes times = time_in_turns(
-      options.runs, [&] { world->two_level.build(view, lights, tree); }, [&] { world->tree.build(lights, tree); });
+      options.runs, [&] { world->two_level.build(view, lights, tree); },
+      [&] { world->tree.build(lights, tree); });
   return {times.ratio,
           {{"two-level, rebuilt every frame, ms", times.a_ms},
            {"perfect tree, ms", times.b_ms},
@@ -47,6 +48,8 @@ Result sample_two_level(const Options& options, const std::string& scene) {
 }  // namespace
 
 Result sample_two_level_night_city(const Options& options) { return sample_two_level(options, "night-city"); }
-Result sample_two_level_cornell_lights(const Options& options) { return sample_two_level(options, "cornell-lights"); }
+Result sample_two_level_cornell_lights(const Options& options) {
+  return sample_two_level(options, "cornell-lights");
+}
 
 }  // namespace lumigrove::bench

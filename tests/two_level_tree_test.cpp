@@ -35,7 +35,8 @@ void add_shared_meshes(Scene& scene) {
   Stream random(31);
   add_mesh(scene, add_material(scene, vec3(4, 2, 1)), octahedron(0.7f));
   std::vector<vec3> cloud;
-  for (int i = 0; i < 40; ++i) add_triangle_of_size(cloud, random, random.in_box(vec3(-1), vec3(1, 0.4f, 1)), 0.15f);
+  for (int i = 0; i < 40; ++i)
+    add_triangle_of_size(cloud, random, random.in_box(vec3(-1), vec3(1, 0.4f, 1)), 0.15f);
   add_mesh(scene, add_material(scene, vec3(1, 3, 8), true), cloud);
   add_mesh(scene, add_material(scene, vec3(9)), {vec3(-0.4f, 0, 0), vec3(0, 0, 0.8f), vec3(0.5f, 0, 0)});
 
@@ -109,12 +110,17 @@ mat4 shear() {
 std::vector<NamedScene> instance_scenes() {
   std::vector<NamedScene> scenes;
   scenes.push_back({"turned", instances_of(24, turn)});
-  scenes.push_back({"scaled", instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(0.2f + 3 * r.next().x)); })});
-  scenes.push_back({"mirrored", instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(-1, 1, 1)); })});
   scenes.push_back(
-      {"stretched", instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(4, 0.1f, 1)) * turn(r); })});
-  scenes.push_back({"sheared", instances_of(24, [](Stream& r) { return turn(r) * shear() * stretch(vec3(1, -2, 1)); })});
-  scenes.push_back({"flattened", instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(1, 1e-7f, 1)); })});
+      {"scaled", instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(0.2f + 3 * r.next().x)); })});
+  scenes.push_back(
+      {"mirrored", instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(-1, 1, 1)); })});
+  scenes.push_back({"stretched", instances_of(24, [](Stream& r) {
+                      return turn(r) * stretch(vec3(4, 0.1f, 1)) * turn(r);
+                    })});
+  scenes.push_back(
+      {"sheared", instances_of(24, [](Stream& r) { return turn(r) * shear() * stretch(vec3(1, -2, 1)); })});
+  scenes.push_back(
+      {"flattened", instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(1, 1e-7f, 1)); })});
   scenes.push_back({"with points", with_points(instances_of(12, turn))});
   scenes.push_back({"points only", punctual_cloud(60)});
   return scenes;
@@ -161,10 +167,12 @@ class TwoLevelWorld {
   TwoLevelTree tree_;
 };
 
-constexpr LightTree::Options kTrees[] = {{2, false, true}, {4, true, true}, {8, true, true}, {16, true, true}};
+constexpr LightTree::Options kTrees[] = {
+    {2, false, true}, {4, true, true}, {8, true, true}, {16, true, true}};
 
 std::string name_of(const NamedScene& scene, const LightTree::Options& tree) {
-  return std::string(scene.name) + ", width " + std::to_string(tree.width) + (tree.cones ? " with cones" : "");
+  return std::string(scene.name) + ", width " + std::to_string(tree.width) +
+         (tree.cones ? " with cones" : "");
 }
 
 TreeSample draw(const LightSampler& sampler, const Surface& s, Stream& random) {
@@ -182,7 +190,8 @@ TEST(TwoLevelTree, ProbabilitiesNeverExceedOneAndSumToItInsideTheLights) {
       double best = 0;
       for (const Surface& s : shading_points(60)) {
         double sum = 0;
-        for (std::uint32_t e = 0; e < sampler.lights.emitters.size(); ++e) sum += pdf_choose_emitter(sampler, s, e);
+        for (std::uint32_t e = 0; e < sampler.lights.emitters.size(); ++e)
+          sum += pdf_choose_emitter(sampler, s, e);
         // A dead branch below a live one loses its share, so the sum may fall short, never exceed.
         EXPECT_LE(sum, 1 + 1e-4) << name_of(named, options);
         best = std::max(best, sum);
@@ -246,8 +255,8 @@ TEST(TwoLevelTree, BatchesWalkAsSinglePointsDo) {
   Stream random(6), again(6);
   for (int i = 0; i < kWalkBatch; ++i) {
     const vec4 u = random.next();
-    points.set(i, surfaces[static_cast<std::size_t>(i)].position, surfaces[static_cast<std::size_t>(i)].normal,
-               vec2(u.x, u.y));
+    points.set(i, surfaces[static_cast<std::size_t>(i)].position,
+               surfaces[static_cast<std::size_t>(i)].normal, vec2(u.x, u.y));
   }
   TreeSample samples[kWalkBatch];
   sample_emitters(sampler, whole_tree(sampler.tree), points, kWalkBatch, samples);
@@ -276,7 +285,8 @@ TEST(TwoLevelTree, ContributionImpliesProbability) {
         s.position += shift;
         for (std::uint32_t e = 0; e < sampler.lights.emitters.size(); ++e) {
           const vec4 u = random.next();
-          const EmitterPoint point = sample_emitter_point(sampler.scene, sampler.lights, e, s.position, vec2(u.x, u.y));
+          const EmitterPoint point =
+              sample_emitter_point(sampler.scene, sampler.lights, e, s.position, vec2(u.x, u.y));
           if (!(max_component(point.incident) > 0) || !(glm::dot(point.wi, s.normal) > 1e-5f)) continue;
           ASSERT_GT(pdf_choose_emitter(sampler, s, e), 0.0f) << name_of(named, options) << ", emitter " << e;
         }
@@ -343,7 +353,9 @@ void expect_same_bits(const TwoLevelWorld& a, const TwoLevelWorld& b) {
   ASSERT_EQ(x.count, y.count);
   ASSERT_EQ(a.tree().top().bytes(), b.tree().top().bytes());
   const std::size_t nodes = a.tree().top().bytes() - 4 * x.count;
-  EXPECT_EQ(std::memcmp(x.nodes, y.nodes, nodes - 4 * (a.tree().view().punctual_first + a.lights().punctual.size())), 0);
+  EXPECT_EQ(std::memcmp(x.nodes, y.nodes,
+                        nodes - 4 * (a.tree().view().punctual_first + a.lights().punctual.size())),
+            0);
   const LightSampler sa = a.sampler(), sb = b.sampler();
   Stream ra(3), rb(3);
   for (const Surface& s : shading_points(500)) {
@@ -377,7 +389,8 @@ TEST(TwoLevelTree, SameBitsForAnyThreadCount) {
   Scene scene = instances_of(3000, [](Stream& r) { return turn(r) * stretch(vec3(1, 0.5f, 2)); });
   std::vector<vec3> large;
   Stream random(9);
-  for (int i = 0; i < 20000; ++i) add_triangle_of_size(large, random, random.in_box(vec3(-1), vec3(1)), 0.01f);
+  for (int i = 0; i < 20000; ++i)
+    add_triangle_of_size(large, random, random.in_box(vec3(-1), vec3(1)), 0.01f);
   add_node(scene, {add_mesh(scene, add_material(scene, vec3(1)), large)});
   std::vector<std::unique_ptr<TwoLevelWorld>> worlds;
   for (const std::size_t threads : {1u, 2u, 4u}) {
@@ -390,7 +403,8 @@ TEST(TwoLevelTree, SameBitsForAnyThreadCount) {
 
 TEST(TwoLevelTree, ScalingTheSceneChangesNoProbability) {
   constexpr float kScale = 1024;  // a power of two: exact in floating point
-  const Scene scene = with_points(instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(1, -2, 1)); }));
+  const Scene scene =
+      with_points(instances_of(24, [](Stream& r) { return turn(r) * stretch(vec3(1, -2, 1)); }));
   Scene scaled = scene;  // the meshes stay, their instances grow
   for (Node& node : scaled.nodes) {
     node.translation *= kScale;
@@ -409,7 +423,8 @@ TEST(TwoLevelTree, ScalingTheSceneChangesNoProbability) {
 
 // Where instances keep shapes, a triangle's share of its mesh at x is its share of the unmoved mesh at x'.
 TEST(TwoLevelTree, SharesWithinAMeshDoNotDependOnTheInstanceUnderUniformScale) {
-  constexpr LightTree::Options kNoCones{2, false, true};  // these are widened by the quantisation of a turned axis
+  constexpr LightTree::Options kNoCones{2, false,
+                                        true};  // these are widened by the quantisation of a turned axis
   const vec3 moved(5, 6, 7);
   Scene still, placed;
   add_shared_meshes(still);
@@ -434,7 +449,8 @@ TEST(TwoLevelTree, SharesWithinAMeshDoNotDependOnTheInstanceUnderUniformScale) {
 TEST(TwoLevelTree, InstancesWeighAsTheEmittersTheyShow) {
   std::vector<NamedScene> scenes = instance_scenes();
   std::erase_if(scenes, [](const NamedScene& s) {
-    return s.name == std::string("stretched") || s.name == std::string("sheared") || s.name == std::string("flattened");
+    return s.name == std::string("stretched") || s.name == std::string("sheared") ||
+           s.name == std::string("flattened");
   });
   Scene flat;
   add_shared_meshes(flat);
@@ -448,7 +464,8 @@ TEST(TwoLevelTree, InstancesWeighAsTheEmittersTheyShow) {
     double total = 0, exact = 0;
     const LightTreeView top = world.tree().top().view();
     for (const float intensity : top.level<16>(0)->intensity) total += intensity;
-    for (std::uint32_t e = 0; e < lights.emitters.size(); ++e) exact += emitter_intensity(lights, e) / lights.local_flux;
+    for (std::uint32_t e = 0; e < lights.emitters.size(); ++e)
+      exact += emitter_intensity(lights, e) / lights.local_flux;
     EXPECT_NEAR(total, exact, 1e-3 * exact) << named.name;
   }
 }

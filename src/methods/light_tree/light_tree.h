@@ -22,8 +22,8 @@ class LightTree {
   };
   // Buffers are reused by the next build.
   void build(const LightView& lights, const Options& options);
-  // The same over boxes, which then are the tree's emitters. `bounds` holds all boxes, `diagonal` is the size of what they
-  // are in, metres.
+  // The same over boxes, which then are the tree's emitters. `bounds` holds all boxes, `diagonal` is the size of
+  // what they are in, metres.
   void build(const BoxLeaves& leaves, const Box3& bounds, float diagonal, const Options& options);
   void free_buffers();  // of the build; for trees that last
 

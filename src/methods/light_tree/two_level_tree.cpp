@@ -30,8 +30,10 @@ Box3 emissive_bounds(const MeshView& mesh, const EmissiveInstance& emissive) {
   return reduce(
       static_cast<int>(emissive.count), Box3{},
       [&](int i) {
-        const uvec3 v = mesh.triangles[emissive.triangles ? emissive.triangles[i] : static_cast<std::uint32_t>(i)];
-        return unite(unite(Box3{mesh.positions[v.x], mesh.positions[v.x]}, mesh.positions[v.y]), mesh.positions[v.z]);
+        const uvec3 v =
+            mesh.triangles[emissive.triangles ? emissive.triangles[i] : static_cast<std::uint32_t>(i)];
+        return unite(unite(Box3{mesh.positions[v.x], mesh.positions[v.x]}, mesh.positions[v.y]),
+                     mesh.positions[v.z]);
       },
       [](const Box3& a, const Box3& b) { return unite(a, b); });
 }
@@ -46,13 +48,15 @@ NormalMoments normal_moments(const MeshView& mesh, const EmissiveInstance& emiss
   return reduce(
       static_cast<int>(emissive.count), NormalMoments{},
       [&](int i) {
-        const uvec3 v = mesh.triangles[emissive.triangles ? emissive.triangles[i] : static_cast<std::uint32_t>(i)];
+        const uvec3 v =
+            mesh.triangles[emissive.triangles ? emissive.triangles[i] : static_cast<std::uint32_t>(i)];
         const glm::dvec3 a(mesh.positions[v.x]), b(mesh.positions[v.y]), c(mesh.positions[v.z]);
         const glm::dvec3 cross = glm::cross(b - a, c - a);
         const double intensity = static_cast<double>(boxes[static_cast<std::size_t>(i)].intensity);
         const double squared = glm::dot(cross, cross);
         NormalMoments moments{intensity, glm::dmat3(0)};
-        if (intensity > 0 && squared > 0) moments.normals = glm::outerProduct(cross, cross) * (intensity / squared);
+        if (intensity > 0 && squared > 0)
+          moments.normals = glm::outerProduct(cross, cross) * (intensity / squared);
         return moments;
       },
       [](const NormalMoments& a, const NormalMoments& b) {
@@ -107,7 +111,8 @@ void TwoLevelTree::build_mesh(const MeshView& mesh, const EmissiveInstance& emis
   if (moments.intensity > 0) summary.normals = mat3(moments.normals / moments.intensity);
 
   auto tree = std::make_unique<LightTree>();
-  tree->build(BoxLeaves{boxes, summary.intensity > 0 ? 1 / summary.intensity : 0}, summary.box, size, options_);
+  tree->build(BoxLeaves{boxes, summary.intensity > 0 ? 1 / summary.intensity : 0}, summary.box, size,
+              options_);
   tree->free_buffers();
   const LightTreeView view = tree->view();
   summary.triangles = view.count;
@@ -136,8 +141,8 @@ void TwoLevelTree::build_top(const SceneView& scene, const LightView& lights) {
   boxes_.resize(count);
   const auto first_punctual = static_cast<std::uint32_t>(lights.emitters.size() - lights.punctual.size());
   launch(static_cast<int>(count),
-         TreeInstanceKernel{scene, lights, summaries_.data(), sources_, first_punctual, options_.cones, instances_,
-                            boxes_},
+         TreeInstanceKernel{scene, lights, summaries_.data(), sources_, first_punctual, options_.cones,
+                            instances_, boxes_},
          256);
   const float inverse_flux = lights.local_flux > 0 ? 1 / std::min(lights.local_flux, 1e37f) : 0;
   top_.build(BoxLeaves{boxes_, inverse_flux}, lights.bounds, lights.diagonal, options_);

@@ -21,10 +21,10 @@ class TwoLevelTree {
 
   const LightTree& top() const { return top_; }
   MeshTreesView view() const;
-  std::size_t bytes() const;       // of both levels
-  std::size_t mesh_bytes() const;  // of the lower one
-  double build_ms() const { return build_ms_; }  // of the latest call, without the meshes
-  double mesh_ms() const { return mesh_ms_; }    // of the meshes that the latest call built
+  std::size_t bytes() const;                          // of both levels
+  std::size_t mesh_bytes() const;                     // of the lower one
+  double build_ms() const { return build_ms_; }       // of the latest call, without the meshes
+  double mesh_ms() const { return mesh_ms_; }         // of the meshes that the latest call built
   int meshes_built() const { return meshes_built_; }  // by all calls
   std::uint64_t mesh_triangles() const;               // leaves of all meshes
 

@@ -1,5 +1,6 @@
-// Kernels that build the two-level light tree: boxes of a mesh's triangles once, boxes of its instances every frame. The
-// trees over both are perfect light trees. The method and its header block are in two_level_tree_kernel.h.
+// Kernels that build the two-level light tree: boxes of a mesh's triangles once, boxes of its instances every
+// frame. The trees over both are perfect light trees. The method and its header block are in
+// two_level_tree_kernel.h.
 #pragma once
 
 #include <span>
@@ -36,7 +37,8 @@ struct TriangleBoxKernel {
     const vec3 a = mesh.positions[v.x], b = mesh.positions[v.y], c = mesh.positions[v.z];
     const vec3 cross = glm::cross(b - a, c - a);
     const float twice_area = glm::length(cross);
-    const vec3 radiance = emissive.mean_texture ? emissive.radiance * emissive.mean_texture[i] : emissive.radiance;
+    const vec3 radiance =
+        emissive.mean_texture ? emissive.radiance * emissive.mean_texture[i] : emissive.radiance;
     NodeChild box;
     box.box = {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
     box.intensity = finite_or_zero(luminance(radiance) * inverse_luminance * 0.5f * twice_area);
@@ -59,9 +61,9 @@ LUMI_HD inline float norm(const mat3& m) {
 // Does the map turn, mirror and scale all directions alike?
 LUMI_HD inline bool keeps_shapes(const mat3& m) {
   const float x = length_squared(m[0]), y = length_squared(m[1]), z = length_squared(m[2]);
-  const float bend = glm::max(
-      glm::max(glm::abs(glm::dot(m[0], m[1])), glm::abs(glm::dot(m[0], m[2]))),
-      glm::max(glm::abs(glm::dot(m[1], m[2])), glm::max(glm::abs(x - y), glm::abs(x - z))));
+  const float bend =
+      glm::max(glm::max(glm::abs(glm::dot(m[0], m[1])), glm::abs(glm::dot(m[0], m[2]))),
+               glm::max(glm::abs(glm::dot(m[1], m[2])), glm::max(glm::abs(x - y), glm::abs(x - z))));
   return bend < 1e-5f * x;
 }
 
@@ -150,8 +152,9 @@ struct TreeInstanceKernel {
   LUMI_HD void set_inverse(TreeInstance& instance, const mat3& linear, const mat3& cofactors,
                            const MeshSummary& mesh, float rounding) const {
     constexpr float kWorst = 1e4f, kWorstForCones = 50;  // condition numbers
-    const float largest = glm::max(max_component(glm::abs(linear[0])),
-                                   glm::max(max_component(glm::abs(linear[1])), max_component(glm::abs(linear[2]))));
+    const float largest =
+        glm::max(max_component(glm::abs(linear[0])),
+                 glm::max(max_component(glm::abs(linear[1])), max_component(glm::abs(linear[2]))));
     const float determinant = glm::dot(linear[0], cofactors[0]);
     const mat3 inverse = glm::transpose(cofactors) * (1 / determinant);
     const float condition = norm(linear) * norm(inverse) * (1.0f / 3);

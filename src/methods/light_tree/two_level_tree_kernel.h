@@ -1,27 +1,29 @@
-// Method      Picks one emitter out of very many in a scene of instances: a walk down a perfect tree over the instances,
-//             then one down the tree of the mesh that the instance shows, which all its instances share.
-// Paper       D. Lin, C. Yuksel, "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020): 3.1, two-level trees;
-//             mapping of the point into the mesh's space as in the authors' code.
-// Symbols     top level -> LightTreeView of the sampler -> over instances with emissive triangles, point and spot lights
-//             bottom level -> MeshTreesView::trees -> by mesh, in its own space, intensities relative to each other
+// Method      Picks one emitter out of very many in a scene of instances: a walk down a perfect tree over the
+//             instances, then one down the tree of the mesh that the instance shows, which all its instances share.
+// Paper       D. Lin, C. Yuksel, "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020): 3.1, two-level
+//             trees; mapping of the point into the mesh's space as in the authors' code.
+// Symbols     top level -> LightTreeView of the sampler -> over instances that shine, point and spot lights
+//             bottom level -> MeshTreesView::trees -> by mesh, in its own space; intensities are shares of the mesh's
 //             L, t -> TreeInstance -> linear part and origin of the instance's map y = L y' + t, m
 //             s -> scale of an instance that keeps shapes; its intensity is s^2 times the mesh's
-// Equations   x' = L^-1 (x - t), n' = L^T n / |L^T n| -> to_mesh_space; as n (y - x) = (L^T n) (y' - x'), the horizon stays
-//             where it is under every invertible L, and so does the side that a triangle shines on, mirrored or not
-//             p(emitter) = p(instance) p(triangle | instance)
-// Departures  Distances in the bottom level are the mesh's own. If L keeps shapes all weights are as in world space; under
-//             non-uniform scale and shear distances bend, and shares of flux are those of the unstretched mesh: every
-//             probability stays positive and exact, but samples are chosen less well. The instance's own share is right
-//             to the root mean square of its area scales.
-//             x' is lowered under its tangent plane by what rounding can make of the mesh in the world. Instances whose
-//             map has no (or hardly an) inverse are walked from far away, which is by intensity alone. Cones of a mesh are widened for
-//             instances up to about 600 times its size away from the origin; beyond, they are not used.
+// Equations   x' = L^-1 (x - t), n' = L^T n / |L^T n| -> to_mesh_space; as n (y - x) = (L^T n) (y' - x'), the horizon
+//             stays where it is under every invertible L, and so does the side that a triangle shines on, mirrored
+//             or not
+//             p(emitter) = p(instance) p(triangle | instance) -> pdf_mesh_trees
+// Departures  Distances in the bottom level are the mesh's own. If L keeps shapes all weights are as in world space;
+//             under non-uniform scale and shear distances bend, and shares of flux are those of the unstretched mesh:
+//             every probability stays positive and exact, but samples are chosen less well. The instance's own share
+//             is right to the root mean square of its area scales.
+//             x' is lowered under its tangent plane by what rounding can make of the mesh in the world. Instances
+//             whose map has no (or hardly an) inverse are walked from far away, which is by intensity alone. Cones of
+//             a mesh are widened for instances up to some hundred times its size away from the origin; beyond, they
+//             are not used.
 //             A mesh of one triangle needs no second walk. Triangles of no area in their mesh do not shine.
-// Estimator   unbiased: every emitter that can contribute at x has positive probability, and the probability returned is
-//             exactly the product of the steps taken.
-// In -> Out   points and normals in the world, the walks down the top level -> emitters of the light set and probabilities.
-// Oracle      tests/two_level_tree_test.cpp: sum and chi-square of pdf_mesh_trees, mean against the exhaustive sum with
-//             turned, scaled, mirrored, stretched, sheared and flattened instances.
+// Estimator   unbiased: every emitter that can contribute at x has positive probability, and the probability
+//             returned is exactly the product of the steps taken.
+// In -> Out   points and normals in the world and walks down the top level -> emitters and probabilities.
+// Oracle      tests/two_level_tree_test.cpp: sum and chi-square of pdf_mesh_trees, mean against the exhaustive sum
+//             with turned, scaled, mirrored, stretched, sheared and flattened instances.
 #pragma once
 
 #include "base/rng.h"
@@ -35,10 +37,10 @@ struct alignas(64) TreeInstance {
   mat3 to_mesh = mat3(0);         // L^-1; 0 where there is none
   mat3 normal_to_mesh = mat3(0);  // L^T times a positive number; 0 likewise
   vec3 origin = vec3(0);          // t
-  float slack = 0;                // how far x' is lowered, m of the mesh's space; without L^-1 how far away it is put
-  float slack_per_length = 0;     // and for each metre of x'
-  std::uint32_t first = 0;        // its first emitter
-  std::uint32_t tree = kNone;     // kNone: a point or spot light, or an instance of a single triangle
+  float slack = 0;  // how far x' is lowered, m of the mesh's space; without L^-1 how far away it is put
+  float slack_per_length = 0;  // and for each metre of x'
+  std::uint32_t first = 0;     // its first emitter
+  std::uint32_t tree = kNone;  // kNone: a point or spot light, or an instance of a single triangle
   bool cones = false;
 
   static constexpr std::uint32_t kNone = 0xffffffffu;
@@ -66,7 +68,8 @@ LUMI_HD inline MeshSpacePoint to_mesh_space(const TreeInstance& instance, vec3 x
   const vec3 position = instance.to_mesh * (x - instance.origin);
   const vec3 unit = normal * (1 / glm::sqrt(squared));
   const vec3 apart = glm::abs(position);
-  return {position - unit * (instance.slack + instance.slack_per_length * (apart.x + apart.y + apart.z)), unit};
+  return {position - unit * (instance.slack + instance.slack_per_length * (apart.x + apart.y + apart.z)),
+          unit};
 }
 
 // Two uniform numbers that the walk to the instance did not use up, made from those that it used.
@@ -180,8 +183,8 @@ LUMI_HD inline float pdf_in_mesh(const MeshTreesView& below, const TreeInstance&
 
 // Probability with which walks from the top level's root return `emitter`.
 template <int W>
-LUMI_HD inline float pdf_mesh_trees(const LightTreeView& top, const MeshTreesView& below, const LightView& lights,
-                                    vec3 x, vec3 n, std::uint32_t emitter) {
+LUMI_HD inline float pdf_mesh_trees(const LightTreeView& top, const MeshTreesView& below,
+                                    const LightView& lights, vec3 x, vec3 n, std::uint32_t emitter) {
   const std::uint32_t number = instance_of_emitter(below, lights.emitters[emitter]);
   if (number == kNoEmitter) return 0;
   const float of_instance = pdf_light_tree<W>(top, whole_tree(top), x, n, number);
