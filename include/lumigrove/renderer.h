@@ -21,7 +21,7 @@ struct PassStats {
 inline constexpr const char* kAccelerationStructure = "acceleration structure";
 
 struct StructureStats {
-  std::string name;         // kAccelerationStructure, "light set", "perfect tree", "alias table", "VPLs", ...
+  std::string name;         // kAccelerationStructure, "light set", "perfect tree", "two-level tree", "bottom trees", "alias table", "VPLs", ...
   double build_ms = 0;
   std::uint64_t bytes = 0;
   std::uint64_t elements = 0;

@@ -204,10 +204,31 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   LightSet lights(scene, arrays);
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
-      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, {}, std::move(camera), {}, {}, {}});
+      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, {}, {}, std::move(camera), {}, {},
+      {}});
   build_lights(*world, settings, stats);
   return world;
 }
+
+namespace {
+
+void build_light_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
+  const LightTree::Options options{settings.width, settings.cones, settings.mis};
+  if (settings.hierarchy != Hierarchy::kTwoLevel) {
+    world.tree.build(world.lights.view(), options);
+    stats.structures.push_back(
+        {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
+    return;
+  }
+  TwoLevelTree& tree = world.two_level;
+  const int meshes = tree.meshes_built();
+  tree.build(world.arrays.view(), world.lights.view(), options);
+  if (tree.meshes_built() > meshes)
+    stats.structures.push_back({"bottom trees", tree.mesh_ms(), tree.mesh_bytes(), tree.mesh_triangles()});
+  stats.structures.push_back({"two-level tree", tree.build_ms(), tree.bytes(), tree.top().view().count});
+}
+
+}  // namespace
 
 void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   world.lights.gather(world.arrays, world.state, settings);
@@ -221,9 +242,7 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
     stats.structures.push_back({builder == Hierarchy::kSaoh ? "SAOH tree" : "agglomerative tree", world.bvh.build_ms(),
                                 world.bvh.bytes(), world.bvh.view().count});
   } else if (settings.direct.selection == Selection::kRoot || settings.direct.selection == Selection::kCut) {
-    world.tree.build(lights, {settings.direct.width, settings.direct.cones, settings.direct.mis});
-    stats.structures.push_back(
-        {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
+    build_light_tree(world, settings.direct, stats);
   }
   if (settings.direct.selection == Selection::kPower) {
     const Stopwatch watch;
@@ -303,7 +322,9 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   direct.sampler.scene = world.arrays.view();
   direct.sampler.lights = world.lights.view();
   direct.sampler.alias = world.alias.view();
-  direct.sampler.tree = world.tree.view();
+  const bool two_level = settings.direct.hierarchy == Hierarchy::kTwoLevel;
+  direct.sampler.tree = two_level ? world.two_level.top().view() : world.tree.view();
+  if (two_level) direct.sampler.mesh_trees = world.two_level.view();
   direct.sampler.bvh = world.bvh.view();
   switch (settings.direct.selection) {
     case Selection::kUniform:

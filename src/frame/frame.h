@@ -11,6 +11,7 @@
 #include "methods/light_bvh/light_bvh.h"
 #include "methods/light_sampling/direct_lighting.h"
 #include "methods/light_tree/light_tree.h"
+#include "methods/light_tree/two_level_tree.h"
 #include "methods/substitute_tree/substitute_tree.h"
 #include "methods/vpl/vpl.h"
 #include "methods/vpl_sampling/indirect_lighting.h"
@@ -27,9 +28,10 @@ struct World {
   SceneArrays arrays;
   Tracer tracer;
   LightSet lights;
-  LightTree tree;    // built when direct.hierarchy is perfect and direct.selection is root or cut
-  LightBvh bvh;      // built when direct.hierarchy is saoh or agglomerative and direct.selection is root
-  AliasTable alias;  // built when direct.selection is power
+  LightTree tree;          // built when direct.hierarchy is perfect and direct.selection is root or cut
+  TwoLevelTree two_level;  // built when direct.hierarchy is two-level and direct.selection is root
+  LightBvh bvh;            // built when direct.hierarchy is saoh or agglomerative and direct.selection is root
+  AliasTable alias;        // built when direct.selection is power
   CameraInstance camera;
   // When indirect.transport is vpl:
   VplSet vpls;

@@ -227,10 +227,12 @@ std::vector<Setting> direct_rows() {
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
           vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
                                           {"perfect", Hierarchy::kPerfect},
+                                          {"two-level", Hierarchy::kTwoLevel},
                                           {"saoh", Hierarchy::kSaoh},
                                           {"agglomerative", Hierarchy::kAgglomerative}},
-          "Hierarchy over the emitters: halves of their Morton order, split by the surface-area-orientation heuristic, or "
-          "merged from nearest pairs (slow to build); the last two are binary"),
+          "Hierarchy over the emitters: halves of their Morton order; the same for every mesh, shared by its instances, and "
+          "over these; split by the surface-area-orientation heuristic; merged from nearest pairs (slow to build). The last "
+          "two are binary"),
       choice(
           "direct.weights", [](auto& s) -> auto& { return s.direct.weights; },
           vector<pair<string, Weights>>{{"min-max", Weights::kMinMax}, {"saoh", Weights::kSaoh}},
@@ -427,6 +429,8 @@ void check_cuts(const DirectSettings& s) {
   if (s.selection != Selection::kCut) return;
   if (s.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'cut' cuts a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
+  if (s.hierarchy == Hierarchy::kTwoLevel)
+    throw Error("direct.selection 'cut' cuts one tree, but direct.hierarchy is 'two-level'; use 'perfect'");
   if (s.spp > kMaxCut)
     throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
   if (s.mis) throw Error("direct.mis does not combine with cuts; set direct.selection 'root' or direct.mis false");

@@ -22,6 +22,8 @@
 #include "methods/lightcuts/cut_kernel.h"
 #include "methods/light_tree/light_tree_build_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
+#include "methods/light_tree/two_level_tree_build_kernel.h"
+#include "methods/light_tree/two_level_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
 #include "methods/substitute_tree/substitute_build_kernel.h"
 #include "methods/substitute_tree/substitute_draw_kernel.h"
@@ -99,8 +101,13 @@ template void cuda::launch<BsdfKernel>(int, const BsdfKernel&, cudaStream_t);
 template void cuda::launch<CameraKernel>(int, const CameraKernel&, cudaStream_t);
 template void cuda::launch<SurfaceKernel>(int, const SurfaceKernel&, cudaStream_t);
 template void cuda::launch<EmissionKernel>(int, const EmissionKernel&, cudaStream_t);
-template void cuda::launch<MortonKernel>(int, const MortonKernel&, cudaStream_t);
-template void cuda::launch<LeafNodeKernel<16>>(int, const LeafNodeKernel<16>&, cudaStream_t);
+template void cuda::launch<MortonKernel<EmitterLeaves>>(int, const MortonKernel<EmitterLeaves>&, cudaStream_t);
+template void cuda::launch<MortonKernel<BoxLeaves>>(int, const MortonKernel<BoxLeaves>&, cudaStream_t);
+template void cuda::launch<LeafNodeKernel<16, EmitterLeaves>>(int, const LeafNodeKernel<16, EmitterLeaves>&,
+                                                              cudaStream_t);
+template void cuda::launch<LeafNodeKernel<16, BoxLeaves>>(int, const LeafNodeKernel<16, BoxLeaves>&, cudaStream_t);
+template void cuda::launch<TriangleBoxKernel>(int, const TriangleBoxKernel&, cudaStream_t);
+template void cuda::launch<TreeInstanceKernel>(int, const TreeInstanceKernel&, cudaStream_t);
 template void cuda::launch<InnerNodeKernel<16>>(int, const InnerNodeKernel<16>&, cudaStream_t);
 template void cuda::launch<CutKernel>(int, const CutKernel&, cudaStream_t);
 template void cuda::launch<SplitKernel>(int, const SplitKernel&, cudaStream_t);

@@ -24,7 +24,7 @@ void LightBvh::build(const LightView& lights, const Options& options) {
 
   // Morton order first: neighbours in space are then neighbours in memory.
   LargeArray<KeyIndex> keys(static_cast<std::size_t>(emitters)), scratch;
-  launch(emitters, MortonKernel{lights, lights.bounds.lo, inverse_extent(lights.bounds), keys});
+  launch(emitters, MortonKernel<EmitterLeaves>{{lights, 1}, lights.bounds.lo, inverse_extent(lights.bounds), keys});
   radix_sort(keys, 31, scratch);
   const auto dropped =
       std::partition_point(keys.begin(), keys.end(), [](KeyIndex k) { return k.key < kDroppedKey; });

@@ -222,7 +222,7 @@ struct DirectLightKernel {
         members[size++] = k;
       }
       TreeSample samples[kWalkBatch];
-      sample_trees(sampler.tree, starts[leader], points, size, samples);
+      sample_emitters(sampler, starts[leader], points, size, samples);
       for (int k = 0; k < size; ++k) chosen[members[k]] = samples[k];
     }
   }

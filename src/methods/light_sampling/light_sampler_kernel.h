@@ -6,7 +6,7 @@
 //             Calculations", ACM TOG 15(1), 1996 for the choice by power.
 // Symbols     p(group) -> group_probabilities -> local emitters, directional lights or environment, given the
 // surface
-//             p(light | group) -> AliasView::pdf, 1/n, pdf_light_tree or pdf_light_bvh
+//             p(light | group) -> AliasView::pdf, 1/n, pdf_light_tree, pdf_mesh_trees or pdf_light_bvh
 //             p(y | light) -> EmitterPoint::area_to_solid / A -> per solid angle at the surface
 // Equations   contribution = f * cos * incident / (p(group) p(light | group) p(y | light))
 // Departures  none
@@ -22,6 +22,7 @@
 #include "lights/alias_table.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
+#include "methods/light_tree/two_level_tree_kernel.h"
 #include "scene/surface.h"
 #include "trace/ray.h"
 
@@ -46,6 +47,7 @@ struct LightSampler {
   LightTreeView tree;     // kTree
   LightBvhView bvh;       // kBvh
   std::uint32_t one = 0;  // kOne: emitters, then directional lights, then the environment
+  MeshTreesView mesh_trees = {};  // kTree: where present, `tree` is the top level over these
 };
 
 struct GroupProbabilities {
@@ -90,6 +92,13 @@ LUMI_HD inline void sample_trees(const LightTreeView& tree, Subtree start, const
   }
 }
 
+// Emitters below `start`, through the trees of meshes where there are any.
+LUMI_HD inline void sample_emitters(const LightSampler& sampler, Subtree start, const WalkPoints& points, int count,
+                                    TreeSample* samples) {
+  sample_trees(sampler.tree, start, points, count, samples);
+  if (sampler.mesh_trees.present()) sample_mesh_trees(sampler.mesh_trees, points, count, samples);
+}
+
 LUMI_HD inline TreeSample sample_tree(const LightTreeView& tree, vec3 x, vec3 n, vec2 u) {
   WalkPoints points;
   points.set(0, x, n, u);
@@ -112,6 +121,20 @@ LUMI_HD inline float pdf_tree(const LightTreeView& tree, Subtree start, vec3 x, 
   }
 }
 
+LUMI_HD inline float pdf_two_level_tree(const LightSampler& sampler, vec3 x, vec3 n, std::uint32_t emitter) {
+  if (sampler.tree.count == 0) return 0;
+  switch (sampler.tree.width) {
+    case 2:
+      return pdf_mesh_trees<2>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
+    case 4:
+      return pdf_mesh_trees<4>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
+    case 8:
+      return pdf_mesh_trees<8>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
+    default:
+      return pdf_mesh_trees<16>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
+  }
+}
+
 // One local emitter; pdf 0 when there is none to choose. u.x, u.y are used up.
 LUMI_HD inline TreeSample choose_emitter(const LightSampler& sampler, const Surface& surface, vec2 u) {
   const std::uint32_t n = static_cast<std::uint32_t>(sampler.lights.emitters.size());
@@ -124,8 +147,13 @@ LUMI_HD inline TreeSample choose_emitter(const LightSampler& sampler, const Surf
       const std::uint32_t i = sample_alias(sampler.alias, u.x, u.y);
       return {i, sampler.alias.pdf(emitter_flux(sampler.lights, i))};
     }
-    case LightChoice::kTree:
-      return sample_tree(sampler.tree, surface.position, surface.normal, u);
+    case LightChoice::kTree: {
+      WalkPoints points;
+      points.set(0, surface.position, surface.normal, u);
+      TreeSample sample;
+      sample_emitters(sampler, whole_tree(sampler.tree), points, 1, &sample);
+      return sample;
+    }
     case LightChoice::kBvh:
       return sample_light_bvh(sampler.bvh, kBvhRoot, surface.position, surface.normal, u);
     case LightChoice::kOne:
@@ -143,6 +171,8 @@ LUMI_HD inline float pdf_choose_emitter(const LightSampler& sampler, const Surfa
     case LightChoice::kPower:
       return sampler.alias.pdf(emitter_flux(sampler.lights, emitter));
     case LightChoice::kTree:
+      if (sampler.mesh_trees.present())
+        return pdf_two_level_tree(sampler, surface.position, surface.normal, emitter);
       return pdf_tree(sampler.tree, whole_tree(sampler.tree), surface.position, surface.normal, emitter);
     case LightChoice::kBvh:
       return pdf_light_bvh(sampler.bvh, kBvhRoot, surface.position, surface.normal, emitter);

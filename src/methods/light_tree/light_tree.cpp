@@ -10,15 +10,30 @@
 namespace lumigrove {
 
 void LightTree::build(const LightView& lights, const Options& options) {
+  const float inverse_flux = lights.local_flux > 0 ? 1 / std::min(lights.local_flux, 1e37f) : 0;
+  build_over(EmitterLeaves{lights, inverse_flux}, lights.emitters.size(), lights.bounds, lights.diagonal, options);
+}
+
+void LightTree::build(const BoxLeaves& leaves, const Box3& bounds, float diagonal, const Options& options) {
+  build_over(leaves, leaves.boxes.size(), bounds, diagonal, options);
+}
+
+void LightTree::free_buffers() {
+  LargeArray<KeyIndex>().swap(keys_);
+  LargeArray<KeyIndex>().swap(scratch_);
+}
+
+template <class Leaves>
+void LightTree::build_over(const Leaves& leaves, std::size_t count, const Box3& bounds, float diagonal,
+                           const Options& options) {
   const Stopwatch watch;
-  const int emitters = static_cast<int>(lights.emitters.size());
   view_ = {};
   view_.width = options.width;
   // Not below the smallest distance whose square a float resolves against the scene.
-  view_.inside2 = std::max(1e-14f * lights.diagonal * lights.diagonal, 1e-30f);
+  view_.inside2 = std::max(1e-14f * diagonal * diagonal, 1e-30f);
 
-  keys_.resize(static_cast<std::size_t>(emitters));
-  launch(emitters, MortonKernel{lights, lights.bounds.lo, inverse_extent(lights.bounds), keys_}, 4096);
+  keys_.resize(count);
+  launch(static_cast<int>(count), MortonKernel<Leaves>{leaves, bounds.lo, inverse_extent(bounds), keys_}, 4096);
   radix_sort(keys_, 31, scratch_);
   const auto dropped =
       std::partition_point(keys_.begin(), keys_.end(), [](KeyIndex k) { return k.key < kDroppedKey; });
@@ -26,19 +41,19 @@ void LightTree::build(const LightView& lights, const Options& options) {
 
   leaf_emitters_.resize(view_.count);
   emitter_leaves_.clear();
-  if (options.keep_leaves) emitter_leaves_.assign(static_cast<std::size_t>(emitters), kNoEmitter);
+  if (options.keep_leaves) emitter_leaves_.assign(count, kNoEmitter);
   switch (options.width) {
     case 2:
-      build_levels<2>(lights);
+      build_levels<2>(leaves);
       break;
     case 4:
-      build_levels<4>(lights);
+      build_levels<4>(leaves);
       break;
     case 8:
-      build_levels<8>(lights);
+      build_levels<8>(leaves);
       break;
     case 16:
-      build_levels<16>(lights);
+      build_levels<16>(leaves);
       break;
     default:
       throw Error("a light tree has 2, 4, 8 or 16 children a node, not " + std::to_string(options.width));
@@ -47,8 +62,8 @@ void LightTree::build(const LightView& lights, const Options& options) {
   build_ms_ = watch.ms();
 }
 
-template <int W>
-void LightTree::build_levels(const LightView& lights) {
+template <int W, class Leaves>
+void LightTree::build_levels(const Leaves& leaves) {
   std::vector<std::uint32_t> counts;  // nodes a level, lowest first
   for (std::uint32_t n = view_.count; n > 0 && (counts.empty() || n > 1);)
     counts.push_back(n = (n + W - 1) / W);
@@ -63,14 +78,13 @@ void LightTree::build_levels(const LightView& lights) {
   nodes_.resize(total * sizeof(LightNode<W>));
   auto* const nodes = reinterpret_cast<LightNode<W>*>(nodes_.data());
 
-  const float inverse_flux = lights.local_flux > 0 ? 1 / std::min(lights.local_flux, 1e37f) : 0;
   for (int level = view_.levels - 1; level >= 0; --level) {
     const std::uint32_t count = counts[static_cast<std::size_t>(view_.levels - 1 - level)];
     LightNode<W>* const here = nodes + view_.level_first[level];
     if (level == view_.levels - 1) {
       launch(static_cast<int>(count),
-             LeafNodeKernel<W>{lights, keys_, view_.count, inverse_flux, here, leaf_emitters_.data(),
-                               emitter_leaves_.empty() ? nullptr : emitter_leaves_.data()},
+             LeafNodeKernel<W, Leaves>{leaves, keys_, view_.count, here, leaf_emitters_.data(),
+                                       emitter_leaves_.empty() ? nullptr : emitter_leaves_.data()},
              1024 / W);
     } else {
       const std::uint32_t below = counts[static_cast<std::size_t>(view_.levels - 2 - level)];

@@ -11,6 +11,8 @@
 
 namespace lumigrove {
 
+struct BoxLeaves;  // light_tree_build_kernel.h
+
 class LightTree {
  public:
   struct Options {
@@ -20,14 +22,20 @@ class LightTree {
   };
   // Buffers are reused by the next build.
   void build(const LightView& lights, const Options& options);
+  // The same over boxes, which then are the tree's emitters. `bounds` holds all boxes, `diagonal` is the size of
+  // what they are in, metres.
+  void build(const BoxLeaves& leaves, const Box3& bounds, float diagonal, const Options& options);
+  void free_buffers();  // of the build; for trees that last
 
   LightTreeView view() const;
   std::size_t bytes() const;  // nodes and tables; not the buffers of the build
   double build_ms() const { return build_ms_; }
 
  private:
-  template <int W>
-  void build_levels(const LightView& lights);
+  template <class Leaves>
+  void build_over(const Leaves& leaves, std::size_t count, const Box3& bounds, float diagonal, const Options& options);
+  template <int W, class Leaves>
+  void build_levels(const Leaves& leaves);
   template <int W>
   int find_first_cones() const;
 

@@ -1,5 +1,5 @@
-// Kernels that build the perfect light tree: Morton codes of the emitters, then every level from the one below it.
-// The method and its header block are in light_tree_kernel.h.
+// Kernels that build the perfect light tree: Morton codes of its leaves, then every level from the one below it.
+// The method and its header block are in light_tree_kernel.h. Leaves are emitters, or boxes that stand for something.
 #pragma once
 
 #include <span>
@@ -13,20 +13,6 @@ namespace lumigrove {
 
 // Sorts after every Morton code: emitters without flux get no leaf.
 inline constexpr std::uint32_t kDroppedKey = 1u << 30;
-
-// keys[i] = (Morton code of the centre of emitter i's box, i).
-struct MortonKernel {
-  LightView lights;
-  vec3 lo, inverse;  // quantisation box: lower corner, 1/extent
-  std::span<KeyIndex> keys;
-
-  LUMI_HD void operator()(int i) const {
-    const std::uint32_t e = static_cast<std::uint32_t>(i);
-    const vec3 centre = emitter_bounds(lights.emitters[e]).centre();
-    const bool dropped = !(emitter_intensity(lights, e) > 0);
-    keys[e] = {dropped ? kDroppedKey : morton30((centre - lo) * inverse), e};
-  }
-};
 
 struct NodeChild {
   Box3 box;
@@ -74,13 +60,57 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch_emitters(const LightView& lights, std::
   prefetch(&lights.instances[source].masked);
 }
 
-// The lowest level: node i over leaves W*i .. W*i+W-1, and the leaf -> emitter table.
-template <int W>
-struct LeafNodeKernel {
+// The emitters themselves as leaves. Intensities are shares of all local flux.
+struct EmitterLeaves {
   LightView lights;
+  float inverse_flux;
+
+  LUMI_HD Box3 box(std::uint32_t e) const { return emitter_bounds(lights.emitters[e]); }
+  LUMI_HD float intensity(std::uint32_t e) const { return emitter_intensity(lights, e); }
+  LUMI_HD NodeChild child(std::uint32_t e) const { return emitter_child(lights, e, inverse_flux); }
+  LUMI_HD LUMI_ALWAYS_INLINE void prefetch_ahead(std::span<const KeyIndex> keys, std::uint32_t leaf,
+                                                 std::uint32_t ahead) const {
+    prefetch_emitters(lights, keys, leaf, ahead);
+  }
+};
+
+// Boxes as leaves. Intensities are shares of their total.
+struct BoxLeaves {
+  std::span<const NodeChild> boxes;
+  float inverse_total;
+
+  LUMI_HD Box3 box(std::uint32_t i) const { return boxes[i].box; }
+  LUMI_HD float intensity(std::uint32_t i) const { return boxes[i].intensity; }
+  LUMI_HD NodeChild child(std::uint32_t i) const {
+    return {boxes[i].box, boxes[i].intensity * inverse_total, boxes[i].cone};
+  }
+  LUMI_HD LUMI_ALWAYS_INLINE void prefetch_ahead(std::span<const KeyIndex> keys, std::uint32_t leaf,
+                                                 std::uint32_t ahead) const {
+    if (leaf + ahead < keys.size()) prefetch(&boxes[keys[leaf + ahead].index]);
+  }
+};
+
+// keys[i] = (Morton code of the centre of leaf i's box, i).
+template <class Leaves>
+struct MortonKernel {
+  Leaves leaves;
+  vec3 lo, inverse;  // quantisation box: lower corner, 1/extent
+  std::span<KeyIndex> keys;
+
+  LUMI_HD void operator()(int i) const {
+    const std::uint32_t e = static_cast<std::uint32_t>(i);
+    const vec3 centre = leaves.box(e).centre();
+    const bool dropped = !(leaves.intensity(e) > 0);
+    keys[e] = {dropped ? kDroppedKey : morton30((centre - lo) * inverse), e};
+  }
+};
+
+// The lowest level: node i over leaves W*i .. W*i+W-1, and the leaf -> emitter table.
+template <int W, class Leaves>
+struct LeafNodeKernel {
+  Leaves leaves;
   std::span<const KeyIndex> keys;  // sorted
   std::uint32_t count;             // leaves
-  float inverse_flux;
   LightNode<W>* nodes;  // of this level
   std::uint32_t* leaf_emitters;
   std::uint32_t* emitter_leaves;  // or null
@@ -94,11 +124,11 @@ struct LeafNodeKernel {
         store_child(nodes[i], c, filler);
         continue;
       }
-      prefetch_emitters(lights, keys, leaf, W);
+      leaves.prefetch_ahead(keys, leaf, W);
       const std::uint32_t e = keys[leaf].index;
       leaf_emitters[leaf] = e;
       if (emitter_leaves) emitter_leaves[e] = leaf;
-      const NodeChild child = emitter_child(lights, e, inverse_flux);
+      const NodeChild child = leaves.child(e);
       if (c == 0) filler = {child.box, 0, child.cone};
       store_child(nodes[i], c, child);
     }
