@@ -30,33 +30,12 @@ LeafRange leaves_below(const LightTreeView& tree, Subtree s) {
 
 LightCut cut_at(const LightTreeView& tree, const Surface& s, const CutOptions& options) {
   LightCut cut;
-  switch (tree.width) {
-    case 2:
-      select_cut<2>(tree, s.position, s.normal, options, cut);
-      break;
-    case 4:
-      select_cut<4>(tree, s.position, s.normal, options, cut);
-      break;
-    case 8:
-      select_cut<8>(tree, s.position, s.normal, options, cut);
-      break;
-    default:
-      select_cut<16>(tree, s.position, s.normal, options, cut);
-  }
+  with_width(tree.width, [&](auto w) { select_cut<w>(tree, s.position, s.normal, options, cut); });
   return cut;
 }
 
 SubtreeBounds bounds_at(const LightTreeView& tree, Subtree s) {
-  switch (tree.width) {
-    case 2:
-      return bounds_of<2>(tree, s);
-    case 4:
-      return bounds_of<4>(tree, s);
-    case 8:
-      return bounds_of<8>(tree, s);
-    default:
-      return bounds_of<16>(tree, s);
-  }
+  return with_width(tree.width, [&](auto w) { return bounds_of<w>(tree, s); });
 }
 
 Scene cloud_of(int n) { return n >= 4 ? triangle_cloud(n, 0.2f, 11) : punctual_cloud(n, 12); }

@@ -62,14 +62,19 @@ void timed(double& ms, const Step& step) {
   step();
 }
 
+// As the camera's surfaces are lit, but by one sample: direct.spp, cuts and splitting are for what the camera sees.
+DirectLighting away_from_camera(DirectLighting direct) {
+  direct.spp = 1;
+  direct.use_cuts = false;
+  direct.use_split = false;
+  return direct;
+}
+
 // Paths go on from the first hits as settings.indirect asks; with MIS their first ray also finds direct light.
 PathTracing make_path_tracing(const Settings& settings, const DirectLighting& direct) {
   PathTracing tracing;
-  tracing.lighting = direct;
+  tracing.lighting = away_from_camera(direct);
   tracing.first_spp = direct.spp;
-  tracing.lighting.spp = 1;  // direct.spp is for what the camera sees, and so are cuts
-  tracing.lighting.use_cuts = false;
-  tracing.lighting.use_split = false;
   tracing.max_bounces = settings.indirect.transport == Transport::kPath ? settings.indirect.max_bounces : 0;
   tracing.roulette_start = settings.indirect.roulette_start;
   tracing.light_scale = settings.light_scale;
@@ -79,17 +84,15 @@ PathTracing make_path_tracing(const Settings& settings, const DirectLighting& di
 
 // One more ray from mirrors and near corners, lit where it arrives as the surfaces themselves are.
 Gather make_gather(const Settings& settings, const DirectLighting& direct, const IndirectLighting& indirect) {
-  Gather gather{direct, indirect, settings.indirect.compensate, settings.force_diffuse};
-  gather.direct.spp = 1;
+  Gather gather{away_from_camera(direct), indirect, settings.indirect.compensate, settings.force_diffuse};
   gather.direct.mis = false;
-  gather.direct.use_cuts = false;
-  gather.direct.use_split = false;
   return gather;
 }
 
 // G-buffer · direct light · indirect light · film, for the pixels of one tile.
 void light_tile(const World& world, const Settings& settings, const DirectLighting& direct,
-                const IndirectLighting& indirect, const CameraView& camera, const PixelWindow& tile, int sample, TileBuffers& b, Film& film) {
+                const IndirectLighting& indirect, const CameraView& camera, const PixelWindow& tile, int sample,
+                TileBuffers& b, Film& film) {
   const int count = tile.count();
   const std::size_t n = static_cast<std::size_t>(count);
   const SceneView scene = world.arrays.view();
@@ -189,6 +192,32 @@ bool uses_bvh(const DirectSettings& s) {
          (s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative);
 }
 
+void build_light_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
+  const LightTree::Options options{settings.width, settings.cones, settings.mis};
+  if (settings.hierarchy != Hierarchy::kTwoLevel) {
+    world.tree.build(world.lights.view(), options);
+    stats.structures.push_back(
+        {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
+    return;
+  }
+  TwoLevelTree& tree = world.two_level;
+  const int meshes = tree.meshes_built();
+  tree.build(world.arrays.view(), world.lights.view(), options);
+  if (tree.meshes_built() > meshes)
+    stats.structures.push_back({"bottom trees", tree.mesh_ms(), tree.mesh_bytes(), tree.mesh_triangles()});
+  stats.structures.push_back({"two-level tree", tree.build_ms(), tree.bytes(), tree.top().view().count});
+}
+
+// weights[i] = weight_of(i), as a table to draw from.
+template <class Weight>
+StructureStats build_alias_table(AliasTable& table, const char* name, std::size_t count, const Weight& weight_of) {
+  const Stopwatch watch;
+  std::vector<float> weights(count);
+  launch(static_cast<int>(count), [&](int i) { weights[static_cast<std::size_t>(i)] = weight_of(i); });
+  table.build(weights);
+  return {name, watch.ms(), table.bytes(), count};
+}
+
 }  // namespace
 
 // --- the world ---------------------------------------------------------------------------------------------
@@ -210,26 +239,6 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   return world;
 }
 
-namespace {
-
-void build_light_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
-  const LightTree::Options options{settings.width, settings.cones, settings.mis};
-  if (settings.hierarchy != Hierarchy::kTwoLevel) {
-    world.tree.build(world.lights.view(), options);
-    stats.structures.push_back(
-        {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
-    return;
-  }
-  TwoLevelTree& tree = world.two_level;
-  const int meshes = tree.meshes_built();
-  tree.build(world.arrays.view(), world.lights.view(), options);
-  if (tree.meshes_built() > meshes)
-    stats.structures.push_back({"bottom trees", tree.mesh_ms(), tree.mesh_bytes(), tree.mesh_triangles()});
-  stats.structures.push_back({"two-level tree", tree.build_ms(), tree.bytes(), tree.top().view().count});
-}
-
-}  // namespace
-
 void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   world.lights.gather(world.arrays, world.state, settings);
   const LightView lights = world.lights.view();
@@ -245,13 +254,9 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
     build_light_tree(world, settings.direct, stats);
   }
   if (settings.direct.selection == Selection::kPower) {
-    const Stopwatch watch;
-    std::vector<float> flux(lights.emitters.size());
-    launch(static_cast<int>(flux.size()), [&](int i) {
-      flux[static_cast<std::size_t>(i)] = emitter_flux(lights, static_cast<std::uint32_t>(i));
-    });
-    world.alias.build(flux);
-    stats.structures.push_back({"alias table", watch.ms(), world.alias.bytes(), flux.size()});
+    stats.structures.push_back(build_alias_table(world.alias, "alias table", lights.emitters.size(), [&](int i) {
+      return emitter_flux(lights, static_cast<std::uint32_t>(i));
+    }));
   }
 }
 
@@ -280,11 +285,11 @@ void trace_vpls(World& world, const Settings& settings, int sample, RenderStats&
                           world.substitutes.view().count, true});
   }
   if (indirect.selection == Selection::kPower) {
-    const Stopwatch watch;
-    std::vector<float> power(vpls.vpls.size());
-    for (std::size_t i = 0; i < power.size(); ++i) power[i] = luminance(vpls.vpls[i].intensity);
-    world.vpl_alias.build(power);
-    set_structure(stats, {"VPL alias table", watch.ms(), world.vpl_alias.bytes(), power.size(), true});
+    StructureStats table = build_alias_table(world.vpl_alias, "VPL alias table", vpls.vpls.size(), [&](int i) {
+      return luminance(vpls.vpls[static_cast<std::size_t>(i)].intensity);
+    });
+    table.of_vpls = true;
+    set_structure(stats, table);
   }
 }
 

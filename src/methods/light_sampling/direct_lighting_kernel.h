@@ -119,8 +119,9 @@ struct DirectLightKernel {
       index[size++] = static_cast<std::uint32_t>(i);
     }
     walk_together(index, walks, size);
-    for (int k = 0; k < size; ++k)
-      write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], end_of_walk(walks[k]), numbers[k]), scale);
+    TreeSample chosen[kWalkBatch];
+    for (int k = 0; k < size; ++k) chosen[k] = end_of_walk(walks[k]);
+    finish(index, groups, numbers, chosen, size, scale);
   }
 
   // A step of each in turn, so that one's arithmetic goes on while another waits.
@@ -152,7 +153,7 @@ struct DirectLightKernel {
 
   LUMI_HD void light_by_walks(std::size_t first, int count) const {
     ChosenGroup groups[kWalkBatch];
-    vec4 numbers[kWalkBatch];
+    vec2 walk_numbers[kWalkBatch], numbers[kWalkBatch];
     Subtree starts[kWalkBatch];
     std::uint32_t index[kWalkBatch];
     int walks = 0;
@@ -169,24 +170,28 @@ struct DirectLightKernel {
       starts[walks] = start_of(i);
       if (starts[walks].children == 0) continue;
       groups[walks] = group;
-      numbers[walks] = u;
+      walk_numbers[walks] = vec2(group.r, u.w);
+      numbers[walks] = vec2(u.y, u.z);
       index[walks++] = static_cast<std::uint32_t>(i);
     }
     TreeSample chosen[kWalkBatch];
-    walk_from_starts(starts, index, groups, numbers, walks, chosen);
-    for (int k = 0; k < walks; ++k) {
+    walk_from_starts(starts, index, walk_numbers, walks, chosen);
+    finish(index, groups, numbers, chosen, walks, cuts.cuts.empty() ? scale : cuts.scale);
+  }
+
+  // Lights the surfaces `index` by what their walks chose; `points`: numbers for the place on the light.
+  LUMI_HD void finish(const std::uint32_t* index, const ChosenGroup* groups, const vec2* points, const TreeSample* chosen,
+                      int count, float weight) const {
+    for (int k = 0; k < count; ++k) {
       if (!(chosen[k].pdf > 0)) continue;
       const Emitter* emitter = &sampler.lights.emitters[chosen[k].emitter];
       prefetch(emitter);
       prefetch(&emitter->source);
     }
     TriangleLighting triangles;
-    const float local_scale = cuts.cuts.empty() ? scale : cuts.scale;
-    for (int k = 0; k < walks; ++k) {
-      const vec2 u(numbers[k].y, numbers[k].z);
-      if (!add_triangle(triangles, index[k], groups[k], chosen[k], u, local_scale))
-        write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], u), local_scale);
-    }
+    for (int k = 0; k < count; ++k)
+      if (!add_triangle(triangles, index[k], groups[k], chosen[k], points[k], weight))
+        write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], points[k]), weight);
     constexpr int kLanes = kWalkBatch < 16 ? kWalkBatch : 16;
     for (int at = 0; at < triangles.count; at += kLanes)
       write_lit<kLanes>(light_by_triangles<kLanes>(triangles, at), glm::min(kLanes, triangles.count - at),
@@ -206,8 +211,8 @@ struct DirectLightKernel {
   }
 
   // Walks that start at one place go together: all of them without cuts, and those of a block that shares one.
-  LUMI_HD void walk_from_starts(const Subtree* starts, const std::uint32_t* index, const ChosenGroup* groups,
-                                const vec4* numbers, int count, TreeSample* chosen) const {
+  LUMI_HD void walk_from_starts(const Subtree* starts, const std::uint32_t* index, const vec2* numbers,
+                                int count, TreeSample* chosen) const {
     bool done[kWalkBatch] = {};
     for (int leader = 0; leader < count; ++leader) {
       if (done[leader]) continue;
@@ -218,7 +223,7 @@ struct DirectLightKernel {
         if (done[k] || !(starts[k] == starts[leader])) continue;
         done[k] = true;
         const Surface& surface = surfaces[index[k]];
-        points.set(size, surface.position, surface.normal, vec2(groups[k].r, numbers[k].w));
+        points.set(size, surface.position, surface.normal, numbers[k]);
         members[size++] = k;
       }
       TreeSample samples[kWalkBatch];

@@ -1,11 +1,9 @@
-// Method      Chooses one light for a surface point, a point on it, and says with what probability:
-// uniformly, by
+// Method      Chooses one light for a surface point, a point on it, and says with what probability: uniformly, by
 //             power, or by a walk down the light tree or a light BVH; directional lights and the environment beside the
 //             local ones.
 // Paper       none of its own; P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting
 //             Calculations", ACM TOG 15(1), 1996 for the choice by power.
-// Symbols     p(group) -> group_probabilities -> local emitters, directional lights or environment, given the
-// surface
+// Symbols     p(group) -> group_probabilities -> local emitters, directional lights or environment, given the surface
 //             p(light | group) -> AliasView::pdf, 1/n, pdf_light_tree, pdf_mesh_trees or pdf_light_bvh
 //             p(y | light) -> EmitterPoint::area_to_solid / A -> per solid angle at the surface
 // Equations   contribution = f * cos * incident / (p(group) p(light | group) p(y | light))
@@ -77,19 +75,11 @@ LUMI_HD inline GroupProbabilities group_probabilities(const LightSampler& sample
 // Walks down `start` for the first `count` points.
 LUMI_HD inline void sample_trees(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
                                  TreeSample* samples) {
-  switch (tree.count > 0 ? tree.width : 0) {
-    case 0:
-      for (int i = 0; i < count; ++i) samples[i] = {};
-      return;
-    case 2:
-      return sample_light_tree<2>(tree, start, points, count, samples);
-    case 4:
-      return sample_light_tree<4>(tree, start, points, count, samples);
-    case 8:
-      return sample_light_tree<8>(tree, start, points, count, samples);
-    default:
-      return sample_light_tree<16>(tree, start, points, count, samples);
+  if (tree.count == 0) {
+    for (int i = 0; i < count; ++i) samples[i] = {};
+    return;
   }
+  with_width(tree.width, [&](auto w) { sample_light_tree<w>(tree, start, points, count, samples); });
 }
 
 // Emitters below `start`, through the trees of meshes where there are any.
@@ -109,30 +99,14 @@ LUMI_HD inline TreeSample sample_tree(const LightTreeView& tree, vec3 x, vec3 n,
 
 LUMI_HD inline float pdf_tree(const LightTreeView& tree, Subtree start, vec3 x, vec3 n, std::uint32_t emitter) {
   if (tree.count == 0) return 0;
-  switch (tree.width) {
-    case 2:
-      return pdf_light_tree<2>(tree, start, x, n, emitter);
-    case 4:
-      return pdf_light_tree<4>(tree, start, x, n, emitter);
-    case 8:
-      return pdf_light_tree<8>(tree, start, x, n, emitter);
-    default:
-      return pdf_light_tree<16>(tree, start, x, n, emitter);
-  }
+  return with_width(tree.width, [&](auto w) { return pdf_light_tree<w>(tree, start, x, n, emitter); });
 }
 
 LUMI_HD inline float pdf_two_level_tree(const LightSampler& sampler, vec3 x, vec3 n, std::uint32_t emitter) {
   if (sampler.tree.count == 0) return 0;
-  switch (sampler.tree.width) {
-    case 2:
-      return pdf_mesh_trees<2>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
-    case 4:
-      return pdf_mesh_trees<4>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
-    case 8:
-      return pdf_mesh_trees<8>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
-    default:
-      return pdf_mesh_trees<16>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
-  }
+  return with_width(sampler.tree.width, [&](auto w) {
+    return pdf_mesh_trees<w>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
+  });
 }
 
 // One local emitter; pdf 0 when there is none to choose. u.x, u.y are used up.

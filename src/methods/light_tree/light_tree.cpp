@@ -26,9 +26,12 @@ void LightTree::free_buffers() {
 template <class Leaves>
 void LightTree::build_over(const Leaves& leaves, std::size_t count, const Box3& bounds, float diagonal,
                            const Options& options) {
+  const int w = options.width;
+  if (w != 2 && w != 4 && w != 8 && w != 16)
+    throw Error("a light tree has 2, 4, 8 or 16 children a node, not " + std::to_string(w));
   const Stopwatch watch;
   view_ = {};
-  view_.width = options.width;
+  view_.width = w;
   // Not below the smallest distance whose square a float resolves against the scene.
   view_.inside2 = std::max(1e-14f * diagonal * diagonal, 1e-30f);
 
@@ -42,22 +45,7 @@ void LightTree::build_over(const Leaves& leaves, std::size_t count, const Box3& 
   leaf_emitters_.resize(view_.count);
   emitter_leaves_.clear();
   if (options.keep_leaves) emitter_leaves_.assign(count, kNoEmitter);
-  switch (options.width) {
-    case 2:
-      build_levels<2>(leaves);
-      break;
-    case 4:
-      build_levels<4>(leaves);
-      break;
-    case 8:
-      build_levels<8>(leaves);
-      break;
-    case 16:
-      build_levels<16>(leaves);
-      break;
-    default:
-      throw Error("a light tree has 2, 4, 8 or 16 children a node, not " + std::to_string(options.width));
-  }
+  with_width(options.width, [&](auto width) { build_levels<width>(leaves); });
   if (!options.cones) view_.first_cones = view_.levels;
   build_ms_ = watch.ms();
 }

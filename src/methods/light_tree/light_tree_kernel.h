@@ -25,6 +25,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 
 #include "base/lanes.h"
 #include "base/vec.h"
@@ -72,6 +73,21 @@ struct LightTreeView {
     return reinterpret_cast<const LightNode<W>*>(nodes) + level_first[l];
   }
 };
+
+// f(std::integral_constant<int, width>()) for the width of a tree: 2, 4, 8 or 16.
+template <class Function>
+LUMI_HD LUMI_ALWAYS_INLINE decltype(auto) with_width(int width, const Function& f) {
+  switch (width) {
+    case 2:
+      return f(std::integral_constant<int, 2>());
+    case 4:
+      return f(std::integral_constant<int, 4>());
+    case 8:
+      return f(std::integral_constant<int, 8>());
+    default:
+      return f(std::integral_constant<int, 16>());
+  }
+}
 
 // Children first, ..., first + children - 1 of a node, and all lights below them: where a walk starts. As nodes are W wide
 // and whole binary trees of their children, every subtree of the binary tree is such a range of 1, 2, 4, ... children.

@@ -14,16 +14,7 @@ constexpr float kConeTolerance = 2.5e-4f;
 
 // The root as one cone over all triangles.
 PackedCone root_cone(const LightTreeView& tree) {
-  switch (tree.width) {
-    case 2:
-      return summarise_node(*tree.level<2>(0)).cone;
-    case 4:
-      return summarise_node(*tree.level<4>(0)).cone;
-    case 8:
-      return summarise_node(*tree.level<8>(0)).cone;
-    default:
-      return summarise_node(*tree.level<16>(0)).cone;
-  }
+  return with_width(tree.width, [&](auto w) { return summarise_node(*tree.level<w>(0)).cone; });
 }
 
 Box3 emissive_bounds(const MeshView& mesh, const EmissiveInstance& emissive) {

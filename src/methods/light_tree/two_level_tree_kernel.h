@@ -152,16 +152,7 @@ LUMI_HD inline void sample_mesh_trees(const MeshTreesView& below, const WalkPoin
                                       TreeSample* samples) {
   MeshWalks walks;
   start_mesh_walks(below, points, count, samples, walks);
-  switch (below.width) {
-    case 2:
-      return walk_mesh_trees<2>(walks, samples);
-    case 4:
-      return walk_mesh_trees<4>(walks, samples);
-    case 8:
-      return walk_mesh_trees<8>(walks, samples);
-    default:
-      return walk_mesh_trees<16>(walks, samples);
-  }
+  with_width(below.width, [&](auto w) { walk_mesh_trees<w>(walks, samples); });
 }
 
 // Number in MeshTreesView::instances of the leaf that holds an emitter.

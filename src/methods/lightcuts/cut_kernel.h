@@ -218,22 +218,8 @@ struct CutKernel {
       const Pixel pixel{pixels.x0 + at % pixels.width(), pixels.y0 + at / pixels.width()};
       const Surface& s = surfaces[static_cast<std::size_t>(index_of_pixel(lookup.window, pixel))];
       if (s.instance == kNoId) continue;
-      select(s, cut);
+      with_width(tree.width, [&](auto w) { select_cut<w>(tree, s.position, s.normal, options, cut); });
       return;
-    }
-  }
-
- private:
-  LUMI_HD void select(const Surface& s, LightCut& cut) const {
-    switch (tree.width) {
-      case 2:
-        return select_cut<2>(tree, s.position, s.normal, options, cut);
-      case 4:
-        return select_cut<4>(tree, s.position, s.normal, options, cut);
-      case 8:
-        return select_cut<8>(tree, s.position, s.normal, options, cut);
-      default:
-        return select_cut<16>(tree, s.position, s.normal, options, cut);
     }
   }
 };
