@@ -220,9 +220,10 @@ std::vector<Setting> direct_rows() {
                                           {"power", Selection::kPower},
                                           {"root", Selection::kRoot},
                                           {"all", Selection::kAll},
-                                          {"cut", Selection::kCut}},
-          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, or walking it "
-          "from every node of a cut"),
+                                          {"cut", Selection::kCut},
+                                          {"pool", Selection::kPool}},
+          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, walking it "
+          "from every node of a cut, or among lights that were drawn for a block of pixels"),
       choice(
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
           vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
@@ -267,6 +268,10 @@ std::vector<Setting> direct_rows() {
                                          {"children", CutBound::kChildren}},
           "Error of a cut's node: by one box around its lights, with the cosine of the box's nearest point or an exact "
           "bound of it; or the sum over the boxes inside it"),
+      choice(
+          "direct.pool", [](auto& s) -> auto& { return s.direct.pool; },
+          vector<pair<string, int>>{{"16", 16}, {"32", 32}, {"48", 48}, {"64", 64}},
+          "Lights that are drawn for a block of cut_share x cut_share pixels; every pixel takes direct.spp of them"),
       real(
           "direct.split", [](auto& s) -> auto& { return s.direct.split; }, {0, 1}, "",
           "Threshold of adaptive tree splitting: a light sample below each part of the tree; larger = more parts, 0 = no "
@@ -437,6 +442,8 @@ void check_cuts(const DirectSettings& s) {
 }
 
 void check_light_bvh(const DirectSettings& s) {
+  if (s.selection == Selection::kPool && (s.hierarchy != Hierarchy::kPerfect || s.mis))
+    throw Error("direct.selection 'pool' needs direct.hierarchy 'perfect' and direct.mis false");
   if (s.selection == Selection::kCut && s.hierarchy != Hierarchy::kPerfect)
     throw Error("direct.selection 'cut' cuts the perfect tree only; set direct.hierarchy 'perfect' or direct.selection "
                 "'root'");
@@ -476,6 +483,17 @@ const std::vector<PresetInfo>& presets() {
        "nodes; direct light only",
        "D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts. Proc. ACM Comput. Graph. Interact. Tech. 3(1), 2020",
        {{"direct.selection", "cut"},
+        {"direct.hierarchy", "perfect"},
+        {"direct.weights", "min-max"},
+        {"direct.spp", "8"},
+        {"direct.cut_share", "8"},
+        {"indirect.transport", "none"}}},
+      {"pool",
+       "Lights drawn for every 8x8 pixels from the perfect light tree, 8 of them taken by each pixel by what they would send "
+       "unoccluded; direct light only",
+       "of this project, from D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts, 2020, and J. Talbot, D. Cline, P. Egbert: "
+       "Importance Resampling for Global Illumination. EGSR 2005",
+       {{"direct.selection", "pool"},
         {"direct.hierarchy", "perfect"},
         {"direct.weights", "min-max"},
         {"direct.spp", "8"},

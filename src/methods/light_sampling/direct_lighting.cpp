@@ -22,7 +22,7 @@ SampleNumbers numbers_of_sample(std::uint32_t seed, std::uint32_t dimension, std
 
 // `scale`: 1 / samples.
 void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler, float scale, const CutSamples& cuts,
-                    const SplitSamples& split, Stratum stratum,
+                    const SplitSamples& split, const PoolSamples& pool, Stratum stratum,
                     std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
                     std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   const int count = static_cast<int>(surfaces.size());
@@ -30,7 +30,7 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
     const ScopedTimer timer(buffers.select_ms);
     launch(walk_batches(count),
            DirectLightKernel{sampler, lighting.rng, dimension, scale, lighting.mis, surfaces, pixels,
-                             buffers.shadow, buffers.contribution, cuts, stratum, split},
+                             buffers.shadow, buffers.contribution, cuts, stratum, split, pool},
            kLaunchGrain / kWalkBatch);
   }
   {
@@ -56,7 +56,7 @@ void add_cut_samples(const DirectLighting& lighting, std::span<const Surface> su
   const float interleave2 = static_cast<float>(lookup.interleave * lookup.interleave);
   for (int pass = 0; pass < passes; ++pass)
     add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(passes),
-                   {buffers.cuts, lookup, pass, interleave2}, {}, {}, surfaces, pixels,
+                   {buffers.cuts, lookup, pass, interleave2}, {}, {}, {}, surfaces, pixels,
                    dimension + 4 * static_cast<std::uint32_t>(pass), buffers, sum);
 }
 
@@ -83,9 +83,32 @@ void add_split_samples(const DirectLighting& lighting, std::span<const Surface> 
           numbers_of_sample(lighting.rng.seed, dimension, static_cast<std::uint32_t>(s * passes + pass));
       current.rng.seed = numbers.seed;
       add_one_sample(current, lighting.sampler, 1 / static_cast<float>(lighting.spp), {},
-                     {buffers.split_entries, buffers.split_counts, lighting.split.cap, pass}, {}, surfaces,
+                     {buffers.split_entries, buffers.split_counts, lighting.split.cap, pass}, {}, {}, surfaces,
                      pixels, numbers.dimension, buffers, sum);
     }
+  }
+}
+
+// `spp` of the lights that were drawn for the surface's block.
+void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
+                      std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
+                      std::span<vec3> sum) {
+  const CutLookup& lookup = lighting.lookup;
+  const std::size_t count = surfaces.size();
+  {
+    const ScopedTimer timer(buffers.pool_ms);
+    buffers.pools.resize(static_cast<std::size_t>(lookup.blocks()));
+    buffers.picks.resize(count * static_cast<std::size_t>(lighting.spp));
+    launch(lookup.blocks(),
+           PoolKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, surfaces, buffers.pools}, 16);
+    launch(static_cast<int>(count), PickKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, lighting.spp,
+                                               surfaces, pixels, buffers.pools, buffers.picks});
+  }
+  for (int s = 0; s < lighting.spp; ++s) {
+    const std::span<const PoolPick> picks(buffers.picks.data() + static_cast<std::size_t>(s) * count, count);
+    add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(lighting.spp), {}, {},
+                   {buffers.pools, picks, lookup}, {}, surfaces, pixels, dimension + 4 * static_cast<std::uint32_t>(s),
+                   buffers, sum);
   }
 }
 
@@ -99,6 +122,10 @@ void add_direct_light(const DirectLighting& lighting, std::span<const Surface> s
   buffers.occluded.resize(surfaces.size());
   if (lighting.use_cuts) {
     add_cut_samples(lighting, surfaces, pixels, dimension, buffers, sum);
+    return;
+  }
+  if (lighting.pool > 0) {
+    add_pool_samples(lighting, surfaces, pixels, dimension, buffers, sum);
     return;
   }
   if (lighting.use_split) {
@@ -117,7 +144,7 @@ void add_direct_light(const DirectLighting& lighting, std::span<const Surface> s
       const SampleNumbers numbers = numbers_of_sample(
           lighting.rng.seed, dimension, light * static_cast<std::uint32_t>(lighting.spp) + static_cast<std::uint32_t>(s));
       current.rng.seed = numbers.seed;
-      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, {},
+      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, {}, {},
                      lighting.all ? Stratum{} : Stratum{s, lighting.spp}, surfaces, pixels,
                      numbers.dimension, buffers, sum);
     }

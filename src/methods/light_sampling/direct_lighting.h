@@ -7,6 +7,7 @@
 
 #include "base/rng.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
+#include "methods/light_sampling/light_pool_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 #include "scene/surface.h"
@@ -27,6 +28,9 @@ struct DirectLighting {
   bool use_cuts = false;
   CutOptions cut;
   CutLookup lookup;
+  // Pools, where above 0: so many lights are drawn for a block of lookup.share pixels squared, and each surface takes
+  // `spp` of them. As cuts, only for all surfaces of a tile.
+  int pool = 0;
   // Splitting, where `use_split`: `spp` samples below each part that the light BVH is split into.
   bool use_split = false;
   SplitOptions split;
@@ -38,10 +42,12 @@ struct DirectBuffers {
   std::vector<vec3> contribution;
   std::vector<std::uint8_t> occluded;
   std::vector<LightCut> cuts;
+  std::vector<LightPool> pools;
+  std::vector<PoolPick> picks;
   std::vector<std::uint32_t> split_entries;
   std::vector<std::uint8_t> split_counts;
   std::uint64_t rays = 0;
-  double cut_ms = 0, split_ms = 0, select_ms = 0, trace_ms = 0;
+  double cut_ms = 0, pool_ms = 0, split_ms = 0, select_ms = 0, trace_ms = 0;
 };
 
 // sum[i] += light reaching surfaces[i] from the chosen lights and leaving it towards wo (radiance).

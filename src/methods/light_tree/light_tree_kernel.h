@@ -143,12 +143,37 @@ struct BoxWeights {
   Lanes<W> near, far, inside;
 };
 
-// `cones` is asked for ConeLanes only when `use_cones`.
-template <int W, class Cones>
+// Rounding must not make a light at the horizon impossible: relative margin of its test.
+inline constexpr float kHorizonMargin = 2e-6f;
+
+// What is lit: a point, or all points within `half` of one, with normals within `spread` of one.
+struct WalkPoint {
+  template <int W>
+  LUMI_HD LaneVec3<W> enlarge(const LaneVec3<W>& box_half) const {
+    return box_half;
+  }
+  LUMI_HD float margin() const { return kHorizonMargin; }
+};
+struct WalkRegion {
+  vec3 half;         // metres
+  float spread = 0;  // |n - normal| <= spread
+
+  // A point of the region is nowhere nearer to the box, nor the box higher above its horizon, than the region's centre is
+  // to the box enlarged by the region, with a margin for the normals.
+  template <int W>
+  LUMI_HD LaneVec3<W> enlarge(const LaneVec3<W>& box_half) const {
+    return {box_half.x + half.x, box_half.y + half.y, box_half.z + half.z};
+  }
+  LUMI_HD float margin() const { return kHorizonMargin + spread; }
+};
+
+// `cones` is asked for ConeLanes only when `use_cones`. `lit`: WalkPoint or WalkRegion.
+template <int W, class Cones, class Lit = WalkPoint>
 LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, bool use_cones, const Cones& cones,
-                                                     float inside2, const LaneVec3<W>& x, const LaneVec3<W>& n) {
+                                                     float inside2, const LaneVec3<W>& x, const LaneVec3<W>& n,
+                                                     const Lit& lit = {}) {
   const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), inside = broadcast<W>(inside2);
-  const LaneVec3<W>& half = box.half;
+  const LaneVec3<W> half = lit.template enlarge<W>(box.half);
   const LaneVec3<W> to_centre{box.centre.x - x.x, box.centre.y - x.y, box.centre.z - x.z};
   const LaneVec3<W> apart = abs_lanes<W>(to_centre);
   const LaneVec3<W> nearest{max_lanes<W>(apart.x - half.x, zero), max_lanes<W>(apart.y - half.y, zero),
@@ -160,7 +185,7 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
   const Lanes<W> far = far2 * inverse_far;
 
   // Height of the box's highest corner above the tangent plane.
-  const Lanes<W> margin = far * 2e-6f;
+  const Lanes<W> margin = far * lit.margin();
   const Lanes<W> height = add_dot<W>(add_dot<W>(margin, abs_lanes<W>(n), half), n, to_centre);
   const Lanes<W> cosine = min_lanes<W>(max_lanes<W>(height, zero) * inverse_near, one);
   Lanes<W> shining = box.intensity * cosine;
@@ -188,11 +213,11 @@ LUMI_HD inline Lanes<W> lanes_in_range(int first, int count) {
 }
 
 // Equations 1 and 2 for the W children of a node at once. `lanes` are the node's boxes, those that do not count without intensity.
-template <int W>
+template <int W, class Lit = WalkPoint>
 LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node, bool cones,
-                                                          float inside2, vec3 x, vec3 n) {
+                                                          float inside2, vec3 x, vec3 n, const Lit& lit = {}) {
   const BoxWeights<W> boxes = weigh_boxes<W>(
-      lanes, cones, [&] { return load_cones<W>(node); }, inside2, broadcast<W>(x), broadcast<W>(n));
+      lanes, cones, [&] { return load_cones<W>(node); }, inside2, broadcast<W>(x), broadcast<W>(n), lit);
   // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
   const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
   const Lanes<W> near = select_lanes<W>(is_inside, boxes.inside, boxes.near);
@@ -204,10 +229,10 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, con
           far_total + far_total};
 }
 
-template <int W>
+template <int W, class Lit = WalkPoint>
 LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
-                                                          vec3 x, vec3 n) {
-  return weigh_children<W>(load_boxes<W>(node), node, cones, inside2, x, n);
+                                                          vec3 x, vec3 n, const Lit& lit = {}) {
+  return weigh_children<W>(load_boxes<W>(node), node, cones, inside2, x, n, lit);
 }
 
 struct ChosenChild {
@@ -269,9 +294,9 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefix_sums_across(Lanes<P> (&a)[W]) {
 
 // The first step, which all walks take from one node: P points at once, child by child, instead of W children at once. A
 // start with few children then costs little.
-template <int W, int P>
+template <int W, int P, class Lit>
 LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, const WalkPoints& points, int first,
-                                    WalkState& state) {
+                                    const Lit& lit, WalkState& state) {
   const LightNode<W>& node = tree.level<W>(start.level)[start.node];
   const int begin = start.first, end = start.first + start.children;
   const Lanes<P> zero = broadcast<P>(0);
@@ -285,7 +310,7 @@ LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, co
   for (int c = begin; c < end; ++c) {
     const BoxWeights<P> box = weigh_boxes<P>(
         broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.inside2,
-        x, n);
+        x, n, lit);
     near[c] = box.near;
     far[c] = box.far;
     inside[c] = box.inside;
@@ -341,16 +366,16 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch_step(const LightTreeView& tree, int lev
 }
 
 // The step of every living walk from a level below the root.
-template <int W>
+template <int W, class Lit>
 LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkPoints& points, int level,
-                                          WalkState& state) {
+                                          const Lit& lit, WalkState& state) {
   const LightNode<W>* nodes = tree.level<W>(level);
   const bool second_number = level == (tree.levels + 1) / 2;
   int kept = 0;
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
     const ChildWeights<W> children = weigh_children<W>(nodes[state.node[i]], level >= tree.first_cones,
-                                                       tree.inside2, points.position(i), points.normal(i));
+                                                       tree.inside2, points.position(i), points.normal(i), lit);
     const ChosenChild chosen = choose_child<W>(children, second_number ? points.u1[i] : state.r[i]);
     state.node[i] = state.node[i] * W + static_cast<std::uint32_t>(chosen.lane);
     state.pdf[i] *= chosen.probability;
@@ -362,22 +387,22 @@ LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkP
   state.living = kept;
 }
 
-// One walk down `start` for each of the first `count` points. start.children > 0.
-template <int W>
+// One walk down `start` for each of the first `count` points, or regions around them. start.children > 0.
+template <int W, class Lit = WalkPoint>
 LUMI_HD inline void sample_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
-                                      TreeSample* samples) {
+                                      TreeSample* samples, const Lit& lit = {}) {
   constexpr int kPoints = kWalkBatch < 16 ? kWalkBatch : 16;
   WalkState state;
   state.living = 0;
   for (int first = 0; first < count; first += kPoints)
-    step_from_start<W, kPoints>(tree, start, points, first, state);
+    step_from_start<W, kPoints>(tree, start, points, first, lit, state);
   for (int i = 0; i < count; ++i) {
     samples[i] = {};
     state.alive[state.living] = i;
     state.living += state.pdf[i] > 0 ? 1 : 0;
     prefetch_step<W>(tree, start.level + 1, state.node[i]);
   }
-  for (int level = start.level + 1; level < tree.levels; ++level) step_down<W>(tree, points, level, state);
+  for (int level = start.level + 1; level < tree.levels; ++level) step_down<W>(tree, points, level, lit, state);
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
     samples[i] = {tree.leaf_emitters[state.node[i]], state.pdf[i]};
