@@ -360,6 +360,8 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
       direct.sampler.choice = LightChoice::kTree;
       direct.pool = settings.direct.pool;
       direct.lookup.share = settings.direct.cut_share;
+      direct.lookup.interleave = settings.direct.cut_interleave;
+      direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
       break;
     case Selection::kAll:
       direct.all = true;

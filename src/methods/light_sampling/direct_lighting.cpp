@@ -93,13 +93,14 @@ void add_split_samples(const DirectLighting& lighting, std::span<const Surface> 
 void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
                       std::span<vec3> sum) {
-  const CutLookup& lookup = lighting.lookup;
+  PoolLookup lookup{lighting.lookup, lighting.lookup.interleave};
+  lookup.areas.share *= lookup.interleave;
   const std::size_t count = surfaces.size();
   {
     const ScopedTimer timer(buffers.pool_ms);
-    buffers.pools.resize(static_cast<std::size_t>(lookup.blocks()));
+    buffers.pools.resize(static_cast<std::size_t>(lookup.pools()));
     buffers.picks.resize(count * static_cast<std::size_t>(lighting.spp));
-    launch(lookup.blocks(),
+    launch(lookup.pools(),
            PoolKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, surfaces, buffers.pools}, 16);
     launch(static_cast<int>(count), PickKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, lighting.spp,
                                                surfaces, pixels, buffers.pools, buffers.picks});

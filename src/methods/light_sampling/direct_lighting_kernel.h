@@ -32,7 +32,7 @@ struct SplitSamples {
 struct PoolSamples {
   std::span<const LightPool> pools;  // by block; none: no pools
   std::span<const PoolPick> picks;   // by surface
-  CutLookup lookup;
+  PoolLookup lookup;
 };
 
 // Of the samples that a surface takes one after another, each chooses its light in its own part of [0,1): neighbours in a
@@ -172,7 +172,7 @@ struct DirectLightKernel {
         continue;
       }
       const LightPool& lights = pool.pools[static_cast<std::size_t>(
-          pool.lookup.block_of(pixel_of_index(pool.lookup.window, static_cast<int>(i))))];
+          pool.lookup.pool_of(pixel_of_index(pool.lookup.areas.window, static_cast<int>(i))))];
       groups[size] = {LightGroup::kLocal, 1, 0};
       numbers[size] = lights.u[pick.light];
       chosen[size] = {lights.emitter[pick.light], pick.pdf};

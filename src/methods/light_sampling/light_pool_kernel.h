@@ -43,6 +43,24 @@ struct alignas(64) LightPool {
   vec2 u[kMaxPool];     // the point on it
 };
 
+// Which pool a pixel takes its lights from. An area of share x interleave pixels squared has interleave^2 pools; neighbours
+// use different ones, so that what they have in common does not show as blocks.
+struct PoolLookup {
+  CutLookup areas;      // share: edge of an area
+  int interleave = 1;   // m
+
+  LUMI_HD int pools_per_area() const { return interleave * interleave; }
+  LUMI_HD int pools() const { return areas.blocks() * pools_per_area(); }
+  LUMI_HD int pool_of(Pixel pixel) const {
+    const int m = interleave;
+    const auto quad_x = static_cast<std::uint32_t>(pixel.x / m), quad_y = static_cast<std::uint32_t>(pixel.y / m);
+    const std::uint32_t turn = pcg4d(uvec4(quad_x, quad_y, areas.frame, 0x51ab3f1u)).x >> 8;
+    const std::uint32_t place = static_cast<std::uint32_t>(pixel.y % m * m + pixel.x % m) + turn;
+    const auto number = static_cast<int>(place % static_cast<std::uint32_t>(m * m));
+    return areas.block_of(pixel) * pools_per_area() + number;
+  }
+};
+
 // Where the surfaces of a block lie: in a box, their normals n with |n - normal| <= spread.
 struct BlockBounds {
   Box3 box;
@@ -109,7 +127,7 @@ LUMI_HD inline void set_pool_light(const LightSampler& sampler, TreeSample chose
 // pools[block]: `size` lights, each from a stratum of its own.
 struct PoolKernel {
   LightSampler sampler;
-  CutLookup lookup;
+  PoolLookup lookup;
   Rng rng;
   int size;
   std::span<const Surface> surfaces;
@@ -117,10 +135,11 @@ struct PoolKernel {
 
   LUMI_HD void operator()(int block) const {
     LightPool& pool = pools[static_cast<std::size_t>(block)];
-    const PixelWindow pixels = lookup.pixels_of(block);
-    const BlockBounds bounds = bounds_of_block(lookup, pixels, surfaces);
-    const auto number = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
-    const Rng numbers{rng.seed, rng.frame, number};
+    const PixelWindow pixels = lookup.areas.pixels_of(block / lookup.pools_per_area());
+    const BlockBounds bounds = bounds_of_block(lookup.areas, pixels, surfaces);
+    const auto corner = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
+    const auto number = static_cast<std::uint32_t>(block % lookup.pools_per_area());
+    const Rng numbers{rng.seed + 0x9e3779b9u * number, rng.frame, corner};
     for (int first = 0; first < size; first += kWalkBatch) {
       TreeSample chosen[kWalkBatch];
       vec2 u[kWalkBatch];
@@ -174,7 +193,7 @@ struct PoolPick {
 // picks[s * surfaces + i], s < samples.
 struct PickKernel {
   LightSampler sampler;
-  CutLookup lookup;
+  PoolLookup lookup;
   Rng rng;
   int size, samples;
   std::span<const Surface> surfaces;
@@ -188,7 +207,7 @@ struct PickKernel {
     if (surface.instance == kNoId) return;
     constexpr int L = kPoolLanes;
     const LightPool& pool =
-        pools[static_cast<std::size_t>(lookup.block_of(pixel_of_index(lookup.window, index)))];
+        pools[static_cast<std::size_t>(lookup.pool_of(pixel_of_index(lookup.areas.window, index)))];
     alignas(64) float weights[kMaxPool], sums[kMaxPool];
     float total = 0;
     for (int first = 0; first < size; first += L) {
