@@ -498,6 +498,7 @@ const std::vector<PresetInfo>& presets() {
         {"direct.weights", "min-max"},
         {"direct.spp", "8"},
         {"direct.cut_share", "8"},
+        {"direct.cut_interleave", "4"},
         {"indirect.transport", "none"}}},
       {"ats",
        "Adaptive tree splitting: a light BVH built by the surface-area-orientation heuristic, split near each surface, a "

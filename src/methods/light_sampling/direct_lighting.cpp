@@ -100,8 +100,8 @@ void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> s
     const ScopedTimer timer(buffers.pool_ms);
     buffers.pools.resize(static_cast<std::size_t>(lookup.pools()));
     buffers.picks.resize(count * static_cast<std::size_t>(lighting.spp));
-    launch(lookup.pools(),
-           PoolKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, surfaces, buffers.pools}, 16);
+    launch(lookup.areas.blocks(),
+           PoolKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, surfaces, buffers.pools}, 4);
     launch(static_cast<int>(count), PickKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, lighting.spp,
                                                surfaces, pixels, buffers.pools, buffers.picks});
   }

@@ -24,7 +24,7 @@
 
 namespace lumigrove {
 
-inline constexpr int kMaxPool = 64;
+inline constexpr int kMaxPool = 64, kMaxDraws = 1024;  // lights of a pool, and of an area
 
 #if defined(__CUDACC__)
 inline constexpr int kPoolLanes = 1;
@@ -124,7 +124,7 @@ LUMI_HD inline void set_pool_light(const LightSampler& sampler, TreeSample chose
   pool.nx[j] = normal.x, pool.ny[j] = normal.y, pool.nz[j] = normal.z;
 }
 
-// pools[block]: `size` lights, each from a stratum of its own.
+// The pools of an area share out lights that are drawn together, each from a stratum of its own.
 struct PoolKernel {
   LightSampler sampler;
   PoolLookup lookup;
@@ -133,36 +133,41 @@ struct PoolKernel {
   std::span<const Surface> surfaces;
   std::span<LightPool> pools;
 
-  LUMI_HD void operator()(int block) const {
-    LightPool& pool = pools[static_cast<std::size_t>(block)];
-    const PixelWindow pixels = lookup.areas.pixels_of(block / lookup.pools_per_area());
-    const BlockBounds bounds = bounds_of_block(lookup.areas, pixels, surfaces);
-    const auto corner = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
-    const auto number = static_cast<std::uint32_t>(block % lookup.pools_per_area());
-    const Rng numbers{rng.seed + 0x9e3779b9u * number, rng.frame, corner};
-    for (int first = 0; first < size; first += kWalkBatch) {
-      TreeSample chosen[kWalkBatch];
-      vec2 u[kWalkBatch];
-      WalkPoints points;
-      const int count = glm::min(kWalkBatch, size - first);
-      for (int k = 0; k < count; ++k) {
-        const vec4 v = numbers.uniform4(kDimPool + 4 * static_cast<std::uint32_t>(first + k));
-        const float r = (static_cast<float>(first + k) + v.x) / static_cast<float>(size);
-        points.set(k, bounds.box.centre(), bounds.normal, vec2(glm::min(r, 0x1.fffffep-1f), v.w));
-        u[k] = vec2(v.y, v.z);
-        chosen[k] = {};
-      }
-      if (bounds.present)
-        sample_region(WalkRegion{0.5f * (bounds.box.hi - bounds.box.lo), bounds.spread}, points, count, chosen);
-      for (int k = 0; k < count; ++k) set_pool_light(sampler, chosen[k], u[k], size, pool, first + k);
-    }
+  LUMI_HD void operator()(int area) const {
+    const int many = lookup.pools_per_area(), count = many * size;
+    TreeSample chosen[kMaxDraws];
+    vec2 u[kMaxDraws];
+    draw(area, count, chosen, u);
+    for (int j = 0; j < count; ++j)
+      set_pool_light(sampler, chosen[j], u[j], size, pools[static_cast<std::size_t>(area * many + j % many)], j / many);
   }
 
  private:
-  LUMI_HD void sample_region(const WalkRegion& region, const WalkPoints& points, int count, TreeSample* chosen) const {
+  LUMI_HD void draw(int area, int count, TreeSample* chosen, vec2* u) const {
+    const PixelWindow pixels = lookup.areas.pixels_of(area);
+    const BlockBounds bounds = bounds_of_block(lookup.areas, pixels, surfaces);
     const LightTreeView& tree = sampler.tree;
-    if (tree.count == 0) return;
-    with_width(tree.width, [&](auto w) { sample_light_tree<w>(tree, whole_tree(tree), points, count, chosen, region); });
+    if (!bounds.present || tree.count == 0) {
+      for (int j = 0; j < count; ++j) chosen[j] = {};
+      return;
+    }
+    const auto corner = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
+    const Rng numbers{rng.seed, rng.frame, corner};
+    float r[kMaxDraws], fresh[kMaxDraws];
+    for (int j = 0; j < count; ++j) {
+      const vec4 v = numbers.uniform4(kDimPool + 4 * static_cast<std::uint32_t>(j));
+      r[j] = glm::min((static_cast<float>(j) + v.x) / static_cast<float>(count), 0x1.fffffep-1f);
+      fresh[j] = v.w;
+      u[j] = vec2(v.y, v.z);
+    }
+    const WalkRegion region{0.5f * (bounds.box.hi - bounds.box.lo), bounds.spread};
+    WalkRange ranges[kMaxDraws], next[kMaxDraws];
+    with_width(tree.width, [&](auto w) {
+      sample_light_tree_sorted<w>(tree, bounds.box.centre(), bounds.normal, region, count, r, fresh, ranges, next,
+                                  chosen);
+    });
+    for (int j = 0; j < count; ++j)
+      if (chosen[j].pdf > 0) prefetch(&sampler.lights.emitters[chosen[j].emitter]);
   }
 };
 

@@ -409,6 +409,65 @@ LUMI_HD inline void sample_light_tree(const LightTreeView& tree, Subtree start, 
   }
 }
 
+// Walks first, ..., end - 1 of a sorted set, which have come the same way.
+struct WalkRange {
+  std::uint32_t node;  // of the level to come
+  float pdf;
+  std::uint32_t first, end;
+};
+
+// Many walks for one point or region: as their numbers `r` ascend, those of a node are neighbours, and its children are
+// weighed once for all of them. `r` is overwritten; `fresh` takes over in the lower half of the levels for walks that go
+// alone, so that they keep enough bits. `ranges`, `next`: room for `count` each. samples[i] is of r[i], with the
+// probability of sample_light_tree.
+template <int W, class Lit>
+LUMI_HD inline void sample_light_tree_sorted(const LightTreeView& tree, vec3 x, vec3 n, const Lit& lit, int count,
+                                             float* r, const float* fresh, WalkRange* ranges, WalkRange* next,
+                                             TreeSample* samples) {
+  int living = 1;
+  ranges[0] = {0, 1, 0, static_cast<std::uint32_t>(count)};
+  for (int level = 0; level < tree.levels; ++level) {
+    const LightNode<W>* nodes = tree.level<W>(level);
+    const bool second_number = level == (tree.levels + 1) / 2, last = level + 1 == tree.levels;
+    int kept = 0;
+    for (int k = 0; k < living; ++k) {
+      const WalkRange range = ranges[k];
+      const ChildWeights<W> children =
+          weigh_children<W>(nodes[range.node], level >= tree.first_cones, tree.inside2, x, n, lit);
+      if (!(children.total > 0)) {
+        for (std::uint32_t i = range.first; i < range.end; ++i) samples[i] = {};
+        continue;
+      }
+      if (second_number && range.end == range.first + 1) r[range.first] = fresh[range.first];
+      const std::uint32_t positive = greater_bits<W>(children.weight, broadcast<W>(0));
+      alignas(64) float weights[W], sums[W];
+      store_lanes<W>(children.weight, weights);
+      store_lanes<W>(children.cumulative, sums);
+      for (std::uint32_t i = range.first; i < range.end;) {
+        const float target = r[i] * children.total;
+        const std::uint32_t beyond = greater_bits<W>(children.cumulative, broadcast<W>(target)) & positive;
+        const int lane = beyond != 0 ? lowest_bit(beyond) : highest_bit(positive);
+        const float before = sums[lane] - weights[lane], inverse = 1 / weights[lane];
+        const WalkRange child{range.node * W + static_cast<std::uint32_t>(lane),
+                              range.pdf * (weights[lane] / children.total), i, range.end};
+        const float end = beyond != 0 ? sums[lane] : kInfinity;
+        for (; i < range.end && r[i] * children.total < end; ++i) {
+          r[i] = glm::min(glm::max((r[i] * children.total - before) * inverse, 0.0f), 0x1.fffffep-1f);
+          if (last) samples[i] = {tree.leaf_emitters[child.node], child.pdf};
+        }
+        if (last) continue;
+        next[kept] = child;
+        next[kept++].end = i;
+        prefetch_step<W>(tree, level + 1, child.node);
+      }
+    }
+    WalkRange* const done = ranges;
+    ranges = next;
+    next = done;
+    living = kept;
+  }
+}
+
 // Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same order. 0 for an
 // emitter that is not below `start`.
 template <int W>
