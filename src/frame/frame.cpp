@@ -66,7 +66,7 @@ void timed(double& ms, const Step& step) {
 DirectLighting away_from_camera(DirectLighting direct) {
   direct.spp = 1;
   direct.use_cuts = false;
-  direct.pool = 0;
+  direct.use_pools = false;
   direct.use_split = false;
   return direct;
 }
@@ -119,7 +119,7 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
   });
 
   DirectLighting of_tile = direct;
-  of_tile.lookup.window = tile;
+  of_tile.lookup.window = of_tile.pools.areas.window = tile;
   add_direct_light(of_tile, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, direct), b.surfaces, b.pixels, b.path_buffers, b.direct,
                  b.indirect);
@@ -358,10 +358,11 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
     }
     case Selection::kPool:
       direct.sampler.choice = LightChoice::kTree;
-      direct.pool = settings.direct.pool;
-      direct.lookup.share = settings.direct.cut_share;
-      direct.lookup.interleave = settings.direct.cut_interleave;
-      direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
+      direct.use_pools = true;
+      direct.pools.size = settings.direct.pool;
+      direct.pools.interleave = settings.direct.cut_interleave;
+      direct.pools.areas.share = settings.direct.cut_share * settings.direct.cut_interleave;
+      direct.pools.areas.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
       break;
     case Selection::kAll:
       direct.all = true;
@@ -416,7 +417,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
   add_pass(stats, "surfaces", sum.surface_ms, 0);
   if (direct.use_split) add_pass(stats, "splitting", sum.direct_buffers.split_ms, 0);
-  if (direct.pool > 0) add_pass(stats, "light pools", sum.direct_buffers.pool_ms, 0);
+  if (direct.use_pools) add_pass(stats, "light pools", sum.direct_buffers.pool_ms, 0);
   if (direct.use_cuts) add_pass(stats, "cuts", sum.direct_buffers.cut_ms, 0);
   add_pass(stats, "light selection", sum.direct_buffers.select_ms, 0);
   add_pass(stats, "shadow rays", sum.direct_buffers.trace_ms, sum.direct_buffers.rays);

@@ -6,6 +6,7 @@
 #include "device/device.h"
 #include "lights/unoccluded_kernel.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
+#include "methods/light_sampling/pool_lighting_kernel.h"
 
 namespace lumigrove {
 namespace {
@@ -20,9 +21,15 @@ SampleNumbers numbers_of_sample(std::uint32_t seed, std::uint32_t dimension, std
   return {seed + 0x9e3779b9u * (sample / kBlocks), dimension + 4 * (sample % kBlocks)};
 }
 
+void trace_shadow_rays(const DirectLighting& lighting, DirectBuffers& buffers) {
+  const ScopedTimer timer(buffers.trace_ms);
+  lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
+  for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
+}
+
 // `scale`: 1 / samples.
 void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler, float scale, const CutSamples& cuts,
-                    const SplitSamples& split, const PoolSamples& pool, Stratum stratum,
+                    const SplitSamples& split, Stratum stratum,
                     std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
                     std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   const int count = static_cast<int>(surfaces.size());
@@ -30,14 +37,10 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
     const ScopedTimer timer(buffers.select_ms);
     launch(walk_batches(count),
            DirectLightKernel{sampler, lighting.rng, dimension, scale, lighting.mis, surfaces, pixels,
-                             buffers.shadow, buffers.contribution, cuts, stratum, split, pool},
+                             buffers.shadow, buffers.contribution, cuts, stratum, split},
            kLaunchGrain / kWalkBatch);
   }
-  {
-    const ScopedTimer timer(buffers.trace_ms);
-    lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
-  }
-  for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
+  trace_shadow_rays(lighting, buffers);
   launch(count, AddUnoccludedKernel{buffers.contribution, buffers.occluded, sum});
 }
 
@@ -56,7 +59,7 @@ void add_cut_samples(const DirectLighting& lighting, std::span<const Surface> su
   const float interleave2 = static_cast<float>(lookup.interleave * lookup.interleave);
   for (int pass = 0; pass < passes; ++pass)
     add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(passes),
-                   {buffers.cuts, lookup, pass, interleave2}, {}, {}, {}, surfaces, pixels,
+                   {buffers.cuts, lookup, pass, interleave2}, {}, {}, surfaces, pixels,
                    dimension + 4 * static_cast<std::uint32_t>(pass), buffers, sum);
 }
 
@@ -83,33 +86,44 @@ void add_split_samples(const DirectLighting& lighting, std::span<const Surface> 
           numbers_of_sample(lighting.rng.seed, dimension, static_cast<std::uint32_t>(s * passes + pass));
       current.rng.seed = numbers.seed;
       add_one_sample(current, lighting.sampler, 1 / static_cast<float>(lighting.spp), {},
-                     {buffers.split_entries, buffers.split_counts, lighting.split.cap, pass}, {}, {}, surfaces,
+                     {buffers.split_entries, buffers.split_counts, lighting.split.cap, pass}, {}, surfaces,
                      pixels, numbers.dimension, buffers, sum);
     }
   }
 }
 
-// `spp` of the lights that were drawn for the surface's block.
+// All samples of so many surfaces are lit before the next, while they are in the cache.
+constexpr std::size_t kSurfacesOfPools = 512;
+
+// `spp` of the lights that were drawn for the surface's area.
 void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
                       std::span<vec3> sum) {
-  PoolLookup lookup{lighting.lookup, lighting.lookup.interleave};
-  lookup.areas.share *= lookup.interleave;
-  const std::size_t count = surfaces.size();
+  const PoolLookup& lookup = lighting.pools;
   {
     const ScopedTimer timer(buffers.pool_ms);
     buffers.pools.resize(static_cast<std::size_t>(lookup.pools()));
-    buffers.picks.resize(count * static_cast<std::size_t>(lighting.spp));
-    launch(lookup.areas.blocks(),
-           PoolKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, surfaces, buffers.pools}, 4);
-    launch(static_cast<int>(count), PickKernel{lighting.sampler, lookup, lighting.rng, lighting.pool, lighting.spp,
-                                               surfaces, pixels, buffers.pools, buffers.picks});
+    launch(lookup.areas.blocks(), PoolKernel{lighting.sampler, lookup, lighting.rng, surfaces, buffers.pools});
   }
-  for (int s = 0; s < lighting.spp; ++s) {
-    const std::span<const PoolPick> picks(buffers.picks.data() + static_cast<std::size_t>(s) * count, count);
-    add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(lighting.spp), {}, {},
-                   {buffers.pools, picks, lookup}, {}, surfaces, pixels, dimension + 4 * static_cast<std::uint32_t>(s),
-                   buffers, sum);
+  const auto samples = static_cast<std::size_t>(lighting.spp);
+  for (std::size_t first = 0; first < surfaces.size(); first += kSurfacesOfPools) {
+    const std::size_t count = std::min(kSurfacesOfPools, surfaces.size() - first), rays = count * samples;
+    buffers.shadow.resize(rays);
+    buffers.contribution.resize(rays);
+    buffers.occluded.resize(rays);
+    {
+      const ScopedTimer timer(buffers.select_ms);
+      launch(walk_batches(static_cast<int>(count)),
+             PoolLightKernel{lighting.sampler, lookup, lighting.rng, dimension, lighting.spp, static_cast<int>(first),
+                             surfaces.subspan(first, count), pixels.subspan(first, count), buffers.pools,
+                             buffers.shadow, buffers.contribution});
+    }
+    trace_shadow_rays(lighting, buffers);
+    for (std::size_t s = 0; s < samples; ++s)
+      launch(static_cast<int>(count),
+             AddUnoccludedKernel{std::span<const vec3>(buffers.contribution).subspan(s * count, count),
+                                 std::span<const std::uint8_t>(buffers.occluded).subspan(s * count, count),
+                                 sum.subspan(first, count)});
   }
 }
 
@@ -118,15 +132,15 @@ void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> s
 void add_direct_light(const DirectLighting& lighting, std::span<const Surface> surfaces,
                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
                       std::span<vec3> sum) {
+  if (lighting.use_pools) {
+    add_pool_samples(lighting, surfaces, pixels, dimension, buffers, sum);
+    return;
+  }
   buffers.shadow.resize(surfaces.size());
   buffers.contribution.resize(surfaces.size());
   buffers.occluded.resize(surfaces.size());
   if (lighting.use_cuts) {
     add_cut_samples(lighting, surfaces, pixels, dimension, buffers, sum);
-    return;
-  }
-  if (lighting.pool > 0) {
-    add_pool_samples(lighting, surfaces, pixels, dimension, buffers, sum);
     return;
   }
   if (lighting.use_split) {
@@ -145,7 +159,7 @@ void add_direct_light(const DirectLighting& lighting, std::span<const Surface> s
       const SampleNumbers numbers = numbers_of_sample(
           lighting.rng.seed, dimension, light * static_cast<std::uint32_t>(lighting.spp) + static_cast<std::uint32_t>(s));
       current.rng.seed = numbers.seed;
-      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, {}, {},
+      add_one_sample(current, sampler, 1 / static_cast<float>(lighting.spp), {}, {},
                      lighting.all ? Stratum{} : Stratum{s, lighting.spp}, surfaces, pixels,
                      numbers.dimension, buffers, sum);
     }

@@ -28,9 +28,10 @@ struct DirectLighting {
   bool use_cuts = false;
   CutOptions cut;
   CutLookup lookup;
-  // Pools, where above 0: so many lights are drawn for a block of lookup.share pixels squared, and each surface takes
-  // `spp` of them. As cuts, only for all surfaces of a tile.
-  int pool = 0;
+  // Pools, where `use_pools`: each surface takes `spp` of the lights that were drawn for its area. As cuts, only for all
+  // surfaces of a tile.
+  bool use_pools = false;
+  PoolLookup pools;
   // Splitting, where `use_split`: `spp` samples below each part that the light BVH is split into.
   bool use_split = false;
   SplitOptions split;
@@ -43,7 +44,6 @@ struct DirectBuffers {
   std::vector<std::uint8_t> occluded;
   std::vector<LightCut> cuts;
   std::vector<LightPool> pools;
-  std::vector<PoolPick> picks;
   std::vector<std::uint32_t> split_entries;
   std::vector<std::uint8_t> split_counts;
   std::uint64_t rays = 0;

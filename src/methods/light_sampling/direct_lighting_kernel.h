@@ -5,7 +5,6 @@
 #include <span>
 
 #include "base/rng.h"
-#include "methods/light_sampling/light_pool_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/light_sampling/triangle_lanes.h"
 #include "methods/lightcuts/cut_kernel.h"
@@ -26,13 +25,6 @@ struct SplitSamples {
   std::span<const std::uint32_t> entries;
   std::span<const std::uint8_t> counts;
   int cap = 0, pass = 0;
-};
-
-// The lights of a tile's blocks, and the picks of this pass.
-struct PoolSamples {
-  std::span<const LightPool> pools;  // by block; none: no pools
-  std::span<const PoolPick> picks;   // by surface
-  PoolLookup lookup;
 };
 
 // Of the samples that a surface takes one after another, each chooses its light in its own part of [0,1): neighbours in a
@@ -57,15 +49,10 @@ struct DirectLightKernel {
   CutSamples cuts = {};     // none: walks start at the root
   Stratum stratum = {};
   SplitSamples split = {};  // kBvh; none: walks start at the root
-  PoolSamples pool = {};
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
     const int count = static_cast<int>(glm::min<std::size_t>(kWalkBatch, surfaces.size() - first));
-    if (!pool.pools.empty()) {
-      light_by_picks(first, count);
-      return;
-    }
     if (sampler.choice == LightChoice::kTree) {
       light_by_walks(first, count);
       return;
@@ -152,33 +139,6 @@ struct DirectLightKernel {
       }
       living = kept;
     }
-  }
-
-  LUMI_HD void light_by_picks(std::size_t first, int count) const {
-    ChosenGroup groups[kWalkBatch];
-    vec2 numbers[kWalkBatch];
-    std::uint32_t index[kWalkBatch];
-    TreeSample chosen[kWalkBatch];
-    int size = 0;
-    for (int k = 0; k < count; ++k) {
-      const std::size_t i = first + static_cast<std::size_t>(k);
-      if (!lights_up(i)) continue;
-      const PoolPick pick = pool.picks[i];
-      if (!(pick.pdf > 0)) continue;
-      if (pick.light == PoolPick::kAtInfinity) {
-        const vec4 u = random_numbers(i);
-        const ChosenGroup group = choose_group_at_infinity(sampler, surfaces[i], u.x);
-        write(i, light_in_group(sampler, surfaces[i], group, {}, vec2(u.y, u.z)), scale / pick.pdf);
-        continue;
-      }
-      const LightPool& lights = pool.pools[static_cast<std::size_t>(
-          pool.lookup.pool_of(pixel_of_index(pool.lookup.areas.window, static_cast<int>(i))))];
-      groups[size] = {LightGroup::kLocal, 1, 0};
-      numbers[size] = lights.u[pick.light];
-      chosen[size] = {lights.emitter[pick.light], pick.pdf};
-      index[size++] = static_cast<std::uint32_t>(i);
-    }
-    finish(index, groups, numbers, chosen, size, scale);
   }
 
   // Where the walk of a surface starts; without children where this pass has no node for its pixel.
@@ -273,11 +233,8 @@ struct DirectLightKernel {
   }
 
   LUMI_HD LUMI_ALWAYS_INLINE void write(std::size_t i, const LightSample& sample, float weight) const {
-    if (!(max_component(sample.weight) > 0)) return;
     const Surface& surface = surfaces[i];
-    const float cosine = glm::dot(surface.normal, sample.wi);
-    if (!(cosine > 0)) return;
-    vec3 light = bsdf_eval(surface, sample.wi) * sample.weight * (cosine * weight);
+    vec3 light = unoccluded_light(surface, sample) * weight;
     // Balance heuristic of n = 1 / scale light samples and one BSDF sample.
     if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + scale * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;
