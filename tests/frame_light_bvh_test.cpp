@@ -41,16 +41,18 @@ ImageMean direct_mean(const Settings& settings) { return image_mean(render(many_
 
 TEST(FrameLightBvh, EveryTreeHasTheMeanOfAllLights) {
   const ImageMean truth = direct_mean(view_of("exhaustive", 30));
-  Settings ats = view_of("ats", 100), capped = ats, averaged = ats, whole = ats, agglomerative = ats, min_max = ats;
+  Settings ats = view_of("ats", 100), capped = ats, averaged = ats, whole = ats, agglomerative = ats, min_max = ats,
+           yuksel = ats;
   capped.direct.split = 0.95f, capped.direct.split_cap = 3;
   averaged.direct.spp = 3, averaged.spp = 40;
   whole.direct.split = 0, whole.spp = 600;
   agglomerative.direct.hierarchy = Hierarchy::kAgglomerative;
   min_max.direct.weights = Weights::kMinMax;
-  for (const Settings* settings : {&ats, &capped, &averaged, &whole, &agglomerative, &min_max}) {
+  yuksel.direct.weights = Weights::kYuksel;
+  for (const Settings* settings : {&ats, &capped, &averaged, &whole, &agglomerative, &min_max, &yuksel}) {
     const ImageMean found = direct_mean(*settings);
     const double error = std::hypot(found.standard_error, truth.standard_error);
-    // 6 comparisons: 4 standard errors keep false alarms below one in two thousand.
+    // 7 comparisons: 4 standard errors keep false alarms below one in two thousand.
     EXPECT_TRUE(mean_within(found.mean, error, truth.mean, 4, 1e-4 * truth.mean));
     EXPECT_LT(error, 0.02 * truth.mean);
   }

@@ -193,7 +193,7 @@ bool uses_bvh(const DirectSettings& s) {
 }
 
 void build_light_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
-  const LightTree::Options options{settings.width, settings.cones, settings.mis};
+  const LightTree::Options options{settings.width, settings.cones, settings.mis, settings.weights};
   if (settings.hierarchy != Hierarchy::kTwoLevel) {
     world.tree.build(world.lights.view(), options);
     stats.structures.push_back(

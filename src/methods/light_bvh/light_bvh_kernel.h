@@ -58,7 +58,7 @@ struct LightBvhView {
   std::uint32_t count = 0;                         // leaves
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
   float unit2 = 1;                                 // squared unit of length of the splitting criterion, m^2
-  bool cones = true;                               // kMinMax: weights bound the emitters' own cosine
+  bool cones = true;                               // not kSaoh: weights bound the emitters' own cosine
   Weights weights = Weights::kMinMax;
 
   LUMI_HD std::uint32_t link(std::uint32_t entry) const { return nodes[entry / 2].child[entry % 2]; }
@@ -113,7 +113,8 @@ LUMI_HD inline float saoh_importance(const LightNode<2>& node, int c, float insi
 }
 
 LUMI_HD inline ChildWeights<2> weigh_children(const LightBvhView& bvh, const LightBvhNode& node, vec3 x, vec3 n) {
-  if (bvh.weights == Weights::kMinMax) return weigh_children<2>(node.bounds, bvh.cones, bvh.inside2, x, n);
+  if (bvh.weights != Weights::kSaoh)
+    return weigh_children<2>(node.bounds, Weighing{bvh.weights, bvh.cones, bvh.inside2}, x, n);
   const float weights[2] = {saoh_importance(node.bounds, 0, bvh.inside2, x, n),
                             saoh_importance(node.bounds, 1, bvh.inside2, x, n)};
   const float sums[2] = {weights[0], weights[0] + weights[1]};
