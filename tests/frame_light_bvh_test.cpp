@@ -58,6 +58,27 @@ TEST(FrameLightBvh, EveryTreeHasTheMeanOfAllLights) {
   }
 }
 
+TEST(FrameLightBvh, PartsHaveTheMeanOfAllLightsBesideBsdfSamples) {
+  Scene scene = many_lights();
+  for (Material& material : scene.materials)
+    if (max_component(material.emission) == 0) material.metallic = 1, material.roughness = 0.3f;
+  const auto mean_of = [&](const char* preset, bool mis, int samples, int spp) {
+    Settings settings = view_of(preset, spp);
+    settings.force_diffuse = false;
+    settings.direct.mis = mis;
+    settings.direct.spp = samples;
+    return image_mean(render(scene, settings), "direct");
+  };
+  const ImageMean truth = mean_of("exhaustive", true, 1, 40);
+  for (const int samples : {1, 3}) {
+    const ImageMean both = mean_of("ats", true, samples, 120), light = mean_of("ats", false, samples, 120);
+    const double error = std::hypot(both.standard_error, truth.standard_error);
+    EXPECT_TRUE(mean_within(both.mean, error, truth.mean, 4, 1e-4 * truth.mean));
+    EXPECT_LT(error, 0.02 * truth.mean);
+    EXPECT_LT(both.standard_error, light.standard_error);
+  }
+}
+
 TEST(FrameLightBvh, ItServesPathsToo) {
   Settings tree = view_of("path", 150), bvh = tree;
   bvh.direct.hierarchy = Hierarchy::kSaoh;

@@ -435,7 +435,6 @@ void check_cuts(const DirectSettings& s) {
     throw Error("direct.selection 'cut' cuts one tree, but direct.hierarchy is 'two-level'; use 'perfect'");
   if (s.spp > kMaxCut)
     throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
-  if (s.mis) throw Error("direct.mis does not combine with cuts; set direct.selection 'root' or direct.mis false");
 }
 
 void check_light_bvh(const DirectSettings& s) {
@@ -449,7 +448,6 @@ void check_light_bvh(const DirectSettings& s) {
                 "'yuksel'");
   if (s.split > 0 && !bvh)
     throw Error("direct.split needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 0");
-  if (s.split > 0 && s.mis) throw Error("direct.mis does not combine with splitting; set direct.split 0 or direct.mis false");
 }
 
 void check_vpls(const IndirectSettings& s) {
