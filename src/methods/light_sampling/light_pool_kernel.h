@@ -24,6 +24,7 @@
 #include "base/lane_math.h"
 #include "base/rng.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/light_tree/region_walk_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 
 namespace lumigrove {
@@ -197,12 +198,10 @@ struct PoolKernel {
       fresh[j] = v.w;
       u[j] = vec2(v.y, v.z);
     }
-    const WalkRegion region{0.5f * (bounds.box.hi - bounds.box.lo), bounds.spread};
+    const WalkRegion region{bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
     WalkRange ranges[kMaxDraws], next[kMaxDraws];
-    with_width(tree.width, [&](auto w) {
-      sample_light_tree_sorted<w>(tree, bounds.box.centre(), bounds.normal, region, count, r, fresh, ranges, next,
-                                  chosen);
-    });
+    const auto n = static_cast<std::size_t>(count);
+    sample_light_tree_sorted(tree, region, {{r, n}, {fresh, n}, {ranges, n}, {next, n}}, {chosen, n});
     for (int j = 0; j < count; ++j)
       if (chosen[j].pdf > 0) prefetch(&sampler.lights.emitters[chosen[j].emitter]);
   }

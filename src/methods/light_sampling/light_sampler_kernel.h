@@ -301,6 +301,14 @@ LUMI_HD inline float pdf_light_environment(const LightSampler& sampler, const Su
   return p > 0 ? p * pdf_environment(sampler.lights.environment, surface.normal, wi) : 0.0f;
 }
 
+// And where one of the lights at infinity is drawn beside the local ones.
+LUMI_HD inline float pdf_environment_beside_local(const LightSampler& sampler, const Surface& surface, vec3 wi) {
+  const GroupProbabilities p = group_probabilities(sampler, surface);
+  if (!(p.environment > 0)) return 0;
+  const float directional_share = p.directional / (p.directional + p.environment);
+  return (1 - directional_share) * pdf_environment(sampler.lights.environment, surface.normal, wi);
+}
+
 // Radiance that a light sample sends towards wo if nothing is in between.
 LUMI_HD LUMI_ALWAYS_INLINE vec3 unoccluded_light(const Surface& surface, const LightSample& sample) {
   if (!(max_component(sample.weight) > 0)) return vec3(0);

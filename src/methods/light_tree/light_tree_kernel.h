@@ -1,14 +1,17 @@
 // Method      Picks one emitter out of very many with probability close to its share of the light at a point, by
 //             one walk down a perfect tree over the emitters in Morton order.
 // Paper       D. Lin, C. Yuksel, "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020): 3.1 and 3.2;
-//             cosine bound and special cases as in the authors' code (distance 0, dead branches).
+//             cosine bound and special cases as in the authors' code (distance 0, dead branches). C. Yuksel,
+//             "Stochastic Lightcuts", HPG 2019, for the weights that theirs are compared with (Weights::kYuksel).
 // Symbols     I_j -> intensity -> Y of the peak radiant intensity under child j, as a share of all local flux
 //             F_j -> cosine -> bound of cos at the receiver over the child's box, no material
 //             d_j^min, d_j^max -> near2, far2 -> squared distance from x to the box's nearest / farthest point, m^2
 //             p_j -> weight / total -> probability of stepping to child j, given its parent
-// Equations   (1) w_j^min, w_j^max and (2) their normalisation, averaged -> weigh_children
+// Equations   (1) w_j^min, w_j^max and (2) their normalisation, averaged -> weigh_children; with kYuksel w_j^min alone,
+//             for all children without the distance where that to one of their boxes is less than the box's diagonal
 // Departures  Nodes have W children (2 is the paper's tree; 4, 8 and 16 weigh their children in one pass over SoA
-//             rows, with eqs. 1-2 normalised over W instead of 2). Bogus leaves are not stored, except to fill the
+//             rows, with eqs. 1-2, or Yuksel's weights, normalised over W instead of 2; boxes of children that cannot
+//             contribute are near to nothing). Bogus leaves are not stored, except to fill the
 //             last node of a level: their intensity is 0. Emitters of no flux are sorted last and left out. Points
 //             closer than 1e-7 D to a box count as inside it. The horizon test has a relative margin of 1e-6, so
 //             that rounding never makes a light at the horizon impossible. F_j is the highest corner's height over
@@ -30,6 +33,7 @@
 #include "base/lanes.h"
 #include "base/vec.h"
 #include "lights/cone_lanes.h"
+#include "lumigrove/settings.h"
 
 namespace lumigrove {
 
@@ -66,6 +70,7 @@ struct LightTreeView {
   int root_children = 0;                           // that are not bogus
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
   int first_cones = 0;  // first level whose weights bound the emitters' own cosine; `levels` for none
+  Weights weights = Weights::kMinMax;  // or kYuksel
 
   // Node k of level l holds children W*k..W*k+W-1 of level l+1.
   template <int W>
@@ -87,6 +92,13 @@ LUMI_HD LUMI_ALWAYS_INLINE decltype(auto) with_width(int width, const Function& 
     default:
       return f(std::integral_constant<int, 16>());
   }
+}
+
+// f(std::integral_constant<Weights, weights>()) for the weights of a tree, so that walks need not ask at every step.
+template <class Function>
+LUMI_HD LUMI_ALWAYS_INLINE decltype(auto) with_weights(Weights weights, const Function& f) {
+  if (weights == Weights::kYuksel) return f(std::integral_constant<Weights, Weights::kYuksel>());
+  return f(std::integral_constant<Weights, Weights::kMinMax>());
 }
 
 // Children first, ..., first + children - 1 of a node, and all lights below them: where a walk starts. As nodes are W wide
@@ -137,43 +149,24 @@ LUMI_HD LUMI_ALWAYS_INLINE ConeLanes<P> broadcast_cone(const LightNode<W>& node,
           broadcast<P>(static_cast<float>(node.radius[c]))};
 }
 
-// Equation 1: w^max and w^min. `inside` is w^max without the distance where x is inside the box, elsewhere 0.
+// Equation 1: w^max and w^min, and either without the distance. `inside` is that where x is inside the box, or for
+// kYuksel nearer than its diagonal, elsewhere 0.
 template <int W>
 struct BoxWeights {
-  Lanes<W> near, far, inside;
+  Lanes<W> near, far, plain, inside;
 };
 
-// Rounding must not make a light at the horizon impossible: relative margin of its test.
+// Rounding must not make a light at the horizon impossible: margin of its test, relative to the distance.
 inline constexpr float kHorizonMargin = 2e-6f;
 
-// What is lit: a point, or all points within `half` of one, with normals within `spread` of one.
-struct WalkPoint {
-  template <int W>
-  LUMI_HD LaneVec3<W> enlarge(const LaneVec3<W>& box_half) const {
-    return box_half;
-  }
-  LUMI_HD float margin() const { return kHorizonMargin; }
-};
-struct WalkRegion {
-  vec3 half;         // metres
-  float spread = 0;  // |n - normal| <= spread
-
-  // A point of the region is nowhere nearer to the box, nor the box higher above its horizon, than the region's centre is
-  // to the box enlarged by the region, with a margin for the normals.
-  template <int W>
-  LUMI_HD LaneVec3<W> enlarge(const LaneVec3<W>& box_half) const {
-    return {box_half.x + half.x, box_half.y + half.y, box_half.z + half.z};
-  }
-  LUMI_HD float margin() const { return kHorizonMargin + spread; }
-};
-
-// `cones` is asked for ConeLanes only when `use_cones`. `lit`: WalkPoint or WalkRegion.
-template <int W, class Cones, class Lit = WalkPoint>
+// `cones` is asked for ConeLanes only when `use_cones`.
+template <int W, class Cones>
 LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, bool use_cones, const Cones& cones,
                                                      float inside2, const LaneVec3<W>& x, const LaneVec3<W>& n,
-                                                     const Lit& lit = {}) {
+                                                     Weights weights = Weights::kMinMax,
+                                                     float horizon_margin = kHorizonMargin) {
   const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), inside = broadcast<W>(inside2);
-  const LaneVec3<W> half = lit.template enlarge<W>(box.half);
+  const LaneVec3<W>& half = box.half;
   const LaneVec3<W> to_centre{box.centre.x - x.x, box.centre.y - x.y, box.centre.z - x.z};
   const LaneVec3<W> apart = abs_lanes<W>(to_centre);
   const LaneVec3<W> nearest{max_lanes<W>(apart.x - half.x, zero), max_lanes<W>(apart.y - half.y, zero),
@@ -185,7 +178,7 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
   const Lanes<W> far = far2 * inverse_far;
 
   // Height of the box's highest corner above the tangent plane.
-  const Lanes<W> margin = far * lit.margin();
+  const Lanes<W> margin = far * horizon_margin;
   const Lanes<W> height = add_dot<W>(add_dot<W>(margin, abs_lanes<W>(n), half), n, to_centre);
   const Lanes<W> cosine = min_lanes<W>(max_lanes<W>(height, zero) * inverse_near, one);
   Lanes<W> shining = box.intensity * cosine;
@@ -193,8 +186,10 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
     const Lanes<W> facing = bound_facing<W>(cones(), to_centre, half, far);
     shining = shining * min_lanes<W>(max_lanes<W>(facing, zero) * inverse_near, one);
   }
-  return {shining * (inverse_near * inverse_near), shining * (inverse_far * inverse_far),
-          keep_if_not_above<W>(near2, inside, shining)};
+  const Lanes<W> plain_inside = weights == Weights::kYuksel
+                                    ? choose_where_greater<W>(dot<W>(half, half) * 4.0f, near2, shining, zero)
+                                    : keep_if_not_above<W>(near2, inside, shining);
+  return {shining * (inverse_near * inverse_near), shining * (inverse_far * inverse_far), shining, plain_inside};
 }
 
 template <int W>
@@ -212,14 +207,32 @@ LUMI_HD inline Lanes<W> lanes_in_range(int first, int count) {
   return load_lanes<W>(lanes);
 }
 
+// How the children of a node are weighed.
+struct Weighing {
+  Weights weights = Weights::kMinMax;  // or kYuksel
+  bool cones = true;                   // weights bound the emitters' own cosine
+  float inside2 = 0;                   // squared distance that counts as inside a box, m^2
+  float horizon_margin = kHorizonMargin;
+};
+
+LUMI_HD LUMI_ALWAYS_INLINE Weighing weighing_of_level(const LightTreeView& tree, int level, Weights weights) {
+  return {weights, level >= tree.first_cones, tree.inside2};
+}
+
 // Equations 1 and 2 for the W children of a node at once. `lanes` are the node's boxes, those that do not count without intensity.
-template <int W, class Lit = WalkPoint>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node, bool cones,
-                                                          float inside2, vec3 x, vec3 n, const Lit& lit = {}) {
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node,
+                                                          const Weighing& weighing, vec3 x, vec3 n) {
   const BoxWeights<W> boxes = weigh_boxes<W>(
-      lanes, cones, [&] { return load_cones<W>(node); }, inside2, broadcast<W>(x), broadcast<W>(n), lit);
-  // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
+      lanes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.inside2, broadcast<W>(x), broadcast<W>(n),
+      weighing.weights, weighing.horizon_margin);
   const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
+  if (weighing.weights == Weights::kYuksel) {
+    const Lanes<W> weights = select_lanes<W>(is_inside, boxes.plain, boxes.near);
+    const Lanes<W> sums = prefix_sum<W>(weights);
+    return {weights, sums, sums[W - 1]};
+  }
+  // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
   const Lanes<W> near = select_lanes<W>(is_inside, boxes.inside, boxes.near);
   // Near weights are scaled to the sum of the far ones, so that the average of both needs no other division.
   const Lanes<W> near_sums = prefix_sum<W>(near), far_sums = prefix_sum<W>(boxes.far);
@@ -229,10 +242,10 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, con
           far_total + far_total};
 }
 
-template <int W, class Lit = WalkPoint>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
-                                                          vec3 x, vec3 n, const Lit& lit = {}) {
-  return weigh_children<W>(load_boxes<W>(node), node, cones, inside2, x, n, lit);
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, const Weighing& weighing, vec3 x,
+                                                          vec3 n) {
+  return weigh_children<W>(load_boxes<W>(node), node, weighing, x, n);
 }
 
 struct ChosenChild {
@@ -294,9 +307,9 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefix_sums_across(Lanes<P> (&a)[W]) {
 
 // The first step, which all walks take from one node: P points at once, child by child, instead of W children at once. A
 // start with few children then costs little.
-template <int W, int P, class Lit>
+template <int W, int P, Weights kWeights>
 LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, const WalkPoints& points, int first,
-                                    const Lit& lit, WalkState& state) {
+                                    WalkState& state) {
   const LightNode<W>& node = tree.level<W>(start.level)[start.node];
   const int begin = start.first, end = start.first + start.children;
   const Lanes<P> zero = broadcast<P>(0);
@@ -306,18 +319,21 @@ LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, co
                       load_lanes<P>(points.nz + first)};
   Lanes<P> near[W], far[W], inside[W];
   Lanes<P> most_inside = zero;
+  constexpr bool kYuksel = kWeights == Weights::kYuksel;
   for (int c = 0; c < W; ++c) near[c] = far[c] = inside[c] = zero;
   for (int c = begin; c < end; ++c) {
     const BoxWeights<P> box = weigh_boxes<P>(
         broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.inside2,
-        x, n, lit);
+        x, n, kWeights);
     near[c] = box.near;
     far[c] = box.far;
-    inside[c] = box.inside;
+    inside[c] = kYuksel ? box.plain : box.inside;
     most_inside = max_lanes<P>(most_inside, box.inside);
   }
-  for (int c = begin; c < end; ++c)
+  for (int c = begin; c < end; ++c) {
     near[c] = choose_where_greater<P>(most_inside, zero, inside[c], near[c]);
+    if (kYuksel) far[c] = near[c];  // the scale below is then 1, and everything twice what weigh_children has
+  }
 
   Lanes<P> near_sums[W], far_sums[W];
   for (int c = 0; c < W; ++c) {
@@ -366,16 +382,17 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch_step(const LightTreeView& tree, int lev
 }
 
 // The step of every living walk from a level below the root.
-template <int W, class Lit>
+template <int W, Weights kWeights>
 LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkPoints& points, int level,
-                                          const Lit& lit, WalkState& state) {
+                                          WalkState& state) {
   const LightNode<W>* nodes = tree.level<W>(level);
   const bool second_number = level == (tree.levels + 1) / 2;
+  const Weighing weighing = weighing_of_level(tree, level, kWeights);
   int kept = 0;
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
-    const ChildWeights<W> children = weigh_children<W>(nodes[state.node[i]], level >= tree.first_cones,
-                                                       tree.inside2, points.position(i), points.normal(i), lit);
+    const ChildWeights<W> children =
+        weigh_children<W>(nodes[state.node[i]], weighing, points.position(i), points.normal(i));
     const ChosenChild chosen = choose_child<W>(children, second_number ? points.u1[i] : state.r[i]);
     state.node[i] = state.node[i] * W + static_cast<std::uint32_t>(chosen.lane);
     state.pdf[i] *= chosen.probability;
@@ -387,85 +404,33 @@ LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkP
   state.living = kept;
 }
 
-// One walk down `start` for each of the first `count` points, or regions around them. start.children > 0.
-template <int W, class Lit = WalkPoint>
-LUMI_HD inline void sample_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
-                                      TreeSample* samples, const Lit& lit = {}) {
+template <int W, Weights kWeights>
+LUMI_HD inline void walk_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
+                                    TreeSample* samples) {
   constexpr int kPoints = kWalkBatch < 16 ? kWalkBatch : 16;
   WalkState state;
   state.living = 0;
   for (int first = 0; first < count; first += kPoints)
-    step_from_start<W, kPoints>(tree, start, points, first, lit, state);
+    step_from_start<W, kPoints, kWeights>(tree, start, points, first, state);
   for (int i = 0; i < count; ++i) {
     samples[i] = {};
     state.alive[state.living] = i;
     state.living += state.pdf[i] > 0 ? 1 : 0;
     prefetch_step<W>(tree, start.level + 1, state.node[i]);
   }
-  for (int level = start.level + 1; level < tree.levels; ++level) step_down<W>(tree, points, level, lit, state);
+  for (int level = start.level + 1; level < tree.levels; ++level)
+    step_down<W, kWeights>(tree, points, level, state);
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
     samples[i] = {tree.leaf_emitters[state.node[i]], state.pdf[i]};
   }
 }
 
-// Walks first, ..., end - 1 of a sorted set, which have come the same way.
-struct WalkRange {
-  std::uint32_t node;  // of the level to come
-  float pdf;
-  std::uint32_t first, end;
-};
-
-// Many walks for one point or region: as their numbers `r` ascend, those of a node are neighbours, and its children are
-// weighed once for all of them. `r` is overwritten; `fresh` takes over in the lower half of the levels for walks that go
-// alone, so that they keep enough bits. `ranges`, `next`: room for `count` each. samples[i] is of r[i], with the
-// probability of sample_light_tree.
-template <int W, class Lit>
-LUMI_HD inline void sample_light_tree_sorted(const LightTreeView& tree, vec3 x, vec3 n, const Lit& lit, int count,
-                                             float* r, const float* fresh, WalkRange* ranges, WalkRange* next,
-                                             TreeSample* samples) {
-  int living = 1;
-  ranges[0] = {0, 1, 0, static_cast<std::uint32_t>(count)};
-  for (int level = 0; level < tree.levels; ++level) {
-    const LightNode<W>* nodes = tree.level<W>(level);
-    const bool second_number = level == (tree.levels + 1) / 2, last = level + 1 == tree.levels;
-    int kept = 0;
-    for (int k = 0; k < living; ++k) {
-      const WalkRange range = ranges[k];
-      const ChildWeights<W> children =
-          weigh_children<W>(nodes[range.node], level >= tree.first_cones, tree.inside2, x, n, lit);
-      if (!(children.total > 0)) {
-        for (std::uint32_t i = range.first; i < range.end; ++i) samples[i] = {};
-        continue;
-      }
-      if (second_number && range.end == range.first + 1) r[range.first] = fresh[range.first];
-      const std::uint32_t positive = greater_bits<W>(children.weight, broadcast<W>(0));
-      alignas(64) float weights[W], sums[W];
-      store_lanes<W>(children.weight, weights);
-      store_lanes<W>(children.cumulative, sums);
-      for (std::uint32_t i = range.first; i < range.end;) {
-        const float target = r[i] * children.total;
-        const std::uint32_t beyond = greater_bits<W>(children.cumulative, broadcast<W>(target)) & positive;
-        const int lane = beyond != 0 ? lowest_bit(beyond) : highest_bit(positive);
-        const float before = sums[lane] - weights[lane], inverse = 1 / weights[lane];
-        const WalkRange child{range.node * W + static_cast<std::uint32_t>(lane),
-                              range.pdf * (weights[lane] / children.total), i, range.end};
-        const float end = beyond != 0 ? sums[lane] : kInfinity;
-        for (; i < range.end && r[i] * children.total < end; ++i) {
-          r[i] = glm::min(glm::max((r[i] * children.total - before) * inverse, 0.0f), 0x1.fffffep-1f);
-          if (last) samples[i] = {tree.leaf_emitters[child.node], child.pdf};
-        }
-        if (last) continue;
-        next[kept] = child;
-        next[kept++].end = i;
-        prefetch_step<W>(tree, level + 1, child.node);
-      }
-    }
-    WalkRange* const done = ranges;
-    ranges = next;
-    next = done;
-    living = kept;
-  }
+// One walk down `start` for each of the first `count` points. start.children > 0.
+template <int W>
+LUMI_HD inline void sample_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
+                                      TreeSample* samples) {
+  with_weights(tree.weights, [&](auto weights) { walk_light_tree<W, weights>(tree, start, points, count, samples); });
 }
 
 // Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same order. 0 for an
@@ -483,7 +448,7 @@ LUMI_HD inline float pdf_light_tree(const LightTreeView& tree, Subtree start, ve
     const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
     BoxLanes<W> boxes = load_boxes<W>(node);
     if (level == start.level) boxes.intensity = boxes.intensity * lanes_in_range<W>(start.first, start.children);
-    const ChildWeights<W> children = weigh_children<W>(boxes, node, level >= tree.first_cones, tree.inside2, x, n);
+    const ChildWeights<W> children = weigh_children<W>(boxes, node, weighing_of_level(tree, level, tree.weights), x, n);
     if (!(children.total > 0)) return 0;
     alignas(64) float weights[W];
     store_lanes<W>(children.weight, weights);
