@@ -11,6 +11,7 @@
 #include "frame/value_text.h"
 #include "lumigrove/settings.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
+#include "methods/light_sampling/light_pool_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 
 namespace lumigrove {
@@ -442,9 +443,17 @@ void check_cuts(const DirectSettings& s) {
     throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
 }
 
+void check_pools(const DirectSettings& s) {
+  if (s.selection != Selection::kPool) return;
+  if (s.hierarchy != Hierarchy::kPerfect)
+    throw Error("direct.selection 'pool' draws its lights from the perfect tree only; set direct.hierarchy 'perfect'");
+  if (s.cut_interleave > kMaxPoolInterleave)
+    throw Error(fmt::format("direct.selection 'pool' interleaves at most {0} x {0} pixels, but direct.cut_interleave is {1}",
+                            kMaxPoolInterleave, s.cut_interleave));
+  if (s.mis) throw Error("direct.mis does not combine with pools; set direct.selection 'root' or 'cut', or direct.mis false");
+}
+
 void check_light_bvh(const DirectSettings& s) {
-  if (s.selection == Selection::kPool && (s.hierarchy != Hierarchy::kPerfect || s.mis))
-    throw Error("direct.selection 'pool' needs direct.hierarchy 'perfect' and direct.mis false");
   if (s.selection == Selection::kCut && s.hierarchy != Hierarchy::kPerfect)
     throw Error("direct.selection 'cut' cuts the perfect tree only; set direct.hierarchy 'perfect' or direct.selection "
                 "'root'");
@@ -604,6 +613,7 @@ void check(const Settings& s) {
   if (s.direct.selection == Selection::kRoot && s.direct.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'root' walks a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
   check_cuts(s.direct);
+  check_pools(s.direct);
   check_light_bvh(s.direct);
   check_vpls(s.indirect);
 }
