@@ -188,7 +188,7 @@ constexpr float kSubstituteOffset = 2.2e-3f;
 constexpr float kInsideDistance = 0.2155f;
 
 bool uses_bvh(const DirectSettings& s) {
-  return s.selection == Selection::kRoot &&
+  return (s.selection == Selection::kRoot || s.selection == Selection::kCut) &&
          (s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative);
 }
 
@@ -331,6 +331,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   direct.sampler.tree = two_level ? world.two_level.top().view() : world.tree.view();
   if (two_level) direct.sampler.mesh_trees = world.two_level.view();
   direct.sampler.bvh = world.bvh.view();
+  const bool bvh = uses_bvh(settings.direct);
   switch (settings.direct.selection) {
     case Selection::kUniform:
       direct.sampler.choice = LightChoice::kUniform;
@@ -339,16 +340,16 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
       direct.sampler.choice = LightChoice::kPower;
       break;
     case Selection::kRoot:
-      direct.sampler.choice = uses_bvh(settings.direct) ? LightChoice::kBvh : LightChoice::kTree;
-      direct.use_split = uses_bvh(settings.direct) && settings.direct.split > 0;
+      direct.sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
+      direct.use_split = bvh && settings.direct.split > 0;
       direct.split = {settings.direct.split, settings.direct.split_cap};
       break;
     case Selection::kCut: {
-      direct.sampler.choice = LightChoice::kTree;
+      direct.sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
       direct.use_cuts = true;
       const float floor = settings.direct.cut_floor * direct.sampler.lights.bounds.diagonal();
-      direct.cut = {settings.direct.spp, std::max(floor * floor, direct.sampler.tree.inside2),
-                    settings.direct.cut_bound};
+      const float inside2 = bvh ? direct.sampler.bvh.inside2 : direct.sampler.tree.inside2;
+      direct.cut = {settings.direct.spp, std::max(floor * floor, inside2), settings.direct.cut_bound};
       direct.lookup.share = settings.direct.cut_share;
       direct.lookup.interleave = settings.direct.cut_interleave;
       direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);

@@ -29,8 +29,8 @@ struct World {
   Tracer tracer;
   LightSet lights;
   LightTree tree;          // built when direct.hierarchy is perfect and direct.selection is root or cut
-  TwoLevelTree two_level;  // built when direct.hierarchy is two-level and direct.selection is root
-  LightBvh bvh;            // built when direct.hierarchy is saoh or agglomerative and direct.selection is root
+  TwoLevelTree two_level;  // built when direct.hierarchy is two-level and direct.selection is root or cut
+  LightBvh bvh;            // built when direct.hierarchy is saoh or agglomerative and direct.selection is root or cut
   AliasTable alias;        // built when direct.selection is power
   CameraInstance camera;
   // When indirect.transport is vpl:
