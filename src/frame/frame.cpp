@@ -222,7 +222,10 @@ StructureStats build_alias_table(AliasTable& table, const char* name, std::size_
 
 // --- the world ---------------------------------------------------------------------------------------------
 
-std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats) {
+std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats,
+                                  History::Kept* kept) {
+  History::Kept known;
+  if (kept) known = take_kept(*kept, scene, settings);
   SceneState state = evaluate(scene, settings.time);
   SceneArrays arrays(scene);
   arrays.set_state(state);
@@ -230,13 +233,20 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   Tracer tracer(scene, state);
   stats.structures.push_back(
       {kAccelerationStructure, watch.ms(), tracer.bytes(), state.instances.size()});
-  LightSet lights(scene, arrays);
+  LightSet lights = known.lights ? std::move(*known.lights) : LightSet(scene, arrays);
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
-      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, {}, {}, std::move(camera), {}, {},
-      {}});
+      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, std::move(known.two_level), {}, {},
+      std::move(camera), known.texture_key, known.shape_key, {}, {}, {}});
   build_lights(*world, settings, stats);
   return world;
+}
+
+void keep(World&& world, History::Kept& kept) {
+  kept.texture_key = world.texture_key;
+  kept.shape_key = world.shape_key;
+  kept.lights.emplace(std::move(world.lights));
+  kept.two_level = std::move(world.two_level);
 }
 
 void build_lights(World& world, const Settings& settings, RenderStats& stats) {
@@ -425,8 +435,8 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "film", sum.film_ms, 0);
 }
 
-Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
-             const ProgressFunction& progress) {
+Image render(const Scene& scene, const Settings& settings, RenderStats* stats, const ProgressFunction& progress,
+             History* history) {
   check(settings);
   RenderStats local;
   RenderStats& result = stats ? *stats : local;
@@ -437,7 +447,8 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
   tbb::task_arena arena(threads);
   return arena.execute([&] {
     const Stopwatch watch;
-    const std::unique_ptr<World> world = make_world(scene, settings, result);
+    History::Kept* const kept = history ? &history->kept() : nullptr;
+    const std::unique_ptr<World> world = make_world(scene, settings, result, kept);
     Film film(settings.width, settings.height,
               settings.indirect.show && settings.indirect.transport == Transport::kVpl);
     for (int sample = 0; sample < settings.spp; ++sample) {
@@ -446,6 +457,7 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
       result.spp_done = sample + 1;
       if (progress && !progress({result.spp_done, settings.spp, watch.ms() * 1e-3})) break;
     }
+    if (kept) keep(std::move(*world), *kept);
     result.total_ms = watch.ms();
     return develop(film, result.spp_done);
   });
