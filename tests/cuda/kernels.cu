@@ -24,6 +24,7 @@
 #include "methods/lightcuts/cut_kernel.h"
 #include "methods/light_tree/light_tree_build_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
+#include "methods/light_tree/region_walk_kernel.h"
 #include "methods/light_tree/two_level_tree_build_kernel.h"
 #include "methods/light_tree/two_level_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
