@@ -25,7 +25,7 @@ inline const char* verdict_name(Verdict verdict) {
 inline constexpr double kSigmas = 3;
 
 struct Relation {
-  int check = 0;          // number in the list of acceptance checks
+  int check = 0;          // number in the list of acceptance checks; 0: none of them
   std::string scene;      // empty: made for the purpose
   std::string what;       // the quantity
   std::string published;  // in the paper's words or numbers; empty: not published
@@ -109,5 +109,6 @@ const std::vector<Reproduction>& reproductions();  // registry.cpp
 
 // One file each.
 std::vector<Check> sst_checks();
+std::vector<Check> rtslc_checks();
 
 }  // namespace lumigrove::bench

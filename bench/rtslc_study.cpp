@@ -1,0 +1,393 @@
+#include "rtslc_study.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/stopwatch.h"
+#include "bench.h"
+#include "device/device.h"
+#include "scene/surface_kernel.h"
+
+namespace lumigrove::bench {
+namespace {
+
+constexpr int kTilesAlongSide = 4;
+constexpr int kTileSize = 64;
+constexpr int kTileAlign = 32;     // so that blocks of any size lie in one tile
+constexpr int kManyVpls = 200000;  // paths of colonnade's sun leave half as many VPLs
+constexpr int kFewVpls = 20000;
+constexpr int kReferenceSpp = 32, kReferenceImages = 32;
+constexpr int kReferenceNumber = 1 << 20;  // beyond the numbers of the images that are compared with it
+
+// Cuts of virtual point lights are looked up as those of emitters are.
+template <class Lighting>
+void set_window(Lighting& lighting, const PixelWindow& window) {
+  if constexpr (requires { lighting.lookup.window; }) lighting.lookup.window = window;
+}
+
+template <class Buffers>
+double cut_ms(const Buffers& buffers) {
+  if constexpr (requires { buffers.cut_ms; })
+    return buffers.cut_ms;
+  else
+    return 0;
+}
+template <class Buffers>
+double split_ms(const Buffers& buffers) {
+  if constexpr (requires { buffers.split_ms; })
+    return buffers.split_ms;
+  else
+    return 0;
+}
+
+bool is_setting(const std::string& key) {
+  const auto& table = settings_table();
+  return std::any_of(table.begin(), table.end(), [&](const SettingInfo& info) { return info.key == key; });
+}
+
+double mean_variance(const std::vector<Mean>& values) {
+  double sum = 0;
+  for (const Mean& value : values) sum += value.estimate().error * value.estimate().error;
+  return sum / static_cast<double>(values.size());
+}
+
+void add_to(std::vector<Mean>& values, const RgbImage& image) {
+  values.resize(image.rgb.size());
+  for (std::size_t i = 0; i < values.size(); ++i) values[i].add(static_cast<double>(image.rgb[i]));
+}
+
+RgbImage means_of(const std::vector<Mean>& values, RgbImage like) {
+  for (std::size_t i = 0; i < values.size(); ++i) like.rgb[i] = static_cast<float>(values[i].mean());
+  return like;
+}
+
+// Means of squares of 2x2 pixels.
+RgbImage halved(const RgbImage& image) {
+  RgbImage result{image.width / 2, image.height / 2, {}, image.name};
+  result.rgb.reserve(image.rgb.size() / 4);
+  const auto at = [&](int x, int y, int channel) {
+    return image.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
+                          static_cast<std::size_t>(x)) +
+                     static_cast<std::size_t>(channel)];
+  };
+  for (int y = 0; y < result.height; ++y)
+    for (int x = 0; x < result.width; ++x)
+      for (int c = 0; c < 3; ++c)
+        result.rgb.push_back(0.25f * (at(2 * x, 2 * y, c) + at(2 * x + 1, 2 * y, c) +
+                                      at(2 * x, 2 * y + 1, c) + at(2 * x + 1, 2 * y + 1, c)));
+  return result;
+}
+
+double squared_error(const RgbImage& reference, double reference_variance, const RgbImage& test) {
+  const double error = rmse(reference, test);
+  return error * error - reference_variance;
+}
+
+}  // namespace
+
+// --- methods ---------------------------------------------------------------------------------------------------
+
+const char* variant_name(Variant variant) { return variant == Variant::kPaper ? "as the paper" : "ours"; }
+
+Method with(Method method, const std::string& name,
+            const std::vector<std::pair<std::string, std::string>>& values) {
+  method.name = name;
+  method.values.insert(method.values.end(), values.begin(), values.end());
+  return method;
+}
+
+Method uniform_method() { return {"uniform", {{"selection", "uniform"}, {"hierarchy", "none"}}}; }
+
+Method perfect_root(Variant variant, bool two_level) {
+  const bool paper = variant == Variant::kPaper;
+  return {"perfect tree",
+          {{"selection", "root"},
+           {"hierarchy", two_level ? "two-level" : "perfect"},
+           {"weights", "min-max"},
+           {"width", paper ? "2" : "16"},
+           {"cones", paper ? "false" : "true"}}};
+}
+
+Method perfect_cut(Variant variant, bool two_level) {
+  return with(perfect_root(variant, two_level), "perfect tree, cuts",
+              {{"selection", "cut"},
+               {"cut_share", "8"},
+               {"cut_bound", variant == Variant::kPaper ? "nearest" : "children"}});
+}
+
+Method unbalanced_root() {
+  return {"unbalanced tree",
+          {{"selection", "root"}, {"hierarchy", "agglomerative"}, {"weights", "min-max"}, {"cones", "true"}}};
+}
+
+Method unbalanced_cut(Variant variant) {
+  return with(unbalanced_root(), "unbalanced tree, cuts",
+              {{"selection", "cut"},
+               {"cut_share", "8"},
+               {"cut_bound", variant == Variant::kPaper ? "nearest" : "children"}});
+}
+
+Method ats(bool splits) {
+  return {splits ? "ats" : "SAOH tree",
+          {{"selection", "root"},
+           {"hierarchy", "saoh"},
+           {"weights", "saoh"},
+           {"split", splits ? "0.75" : "0"},
+           {"split_cap", "16"}}};
+}
+
+Settings subject_settings(const Subject& subject, const Method& method, int spp) {
+  Settings settings = make_preset("uniform");
+  settings.width = kImageWidth;
+  settings.height = kImageHeight;
+  settings.jitter = false;
+  if (subject.vpls) {
+    settings.force_diffuse = true;
+    settings.indirect.transport = Transport::kVpl;
+    settings.indirect.keep_vpls = true;
+    settings.indirect.stop = Stop::kLeaf;
+  }
+  const std::string group = subject.vpls ? "indirect." : "direct.";
+  // One sample below each node, as in the paper.
+  const bool paper = std::any_of(method.values.begin(), method.values.end(),
+                                 [](const auto& value) { return value.second == "nearest"; });
+  if (paper && is_setting(group + "cut_nodes")) set_value(settings, group + "cut_nodes", "0");
+  for (const auto& [key, value] : method.values) set_value(settings, group + key, value);
+  set_value(settings, group + "spp", std::to_string(spp));
+  check(settings);
+  return settings;
+}
+
+std::string why_missing(const Subject& subject, const Method& method, int spp) {
+  try {
+    subject_settings(subject, method, spp);
+    return "";
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+double Measured::ms_median() const { return median(ms); }
+
+std::vector<double> Measured::cost() const {
+  std::vector<double> result = squared;
+  const double time = ms_median();
+  for (double& value : result) value *= time;
+  return result;
+}
+
+// --- a subject -------------------------------------------------------------------------------------------------
+
+SubjectStudy::SubjectStudy(const Subject& subject, bool few_lights, int tile_size)
+    : subject_(subject),
+      few_lights_(few_lights),
+      tile_size_(tile_size),
+      scene_(load_scene(few_lights ? subject.few_lights : subject.scene)) {
+  make_tiles(tile_size);
+}
+
+SubjectStudy& SubjectStudy::of(const Subject& subject) {
+  static std::map<std::string, SubjectStudy> all;
+  return all.try_emplace(subject.scene, subject, false, kTileSize).first->second;
+}
+
+World& SubjectStudy::mutable_world(const Settings& settings) {
+  const std::string group = subject_.vpls ? "indirect." : "direct.";
+  const bool tree =
+      get_value(settings, group + "selection") == "root" || get_value(settings, group + "selection") == "cut";
+  std::string key = tree ? "" : "no tree";
+  for (const char* name : {"hierarchy", "width", "cones", "weights"})
+    if (tree && is_setting(group + name)) key += get_value(settings, group + name) + ' ';
+  auto& world = worlds_[key];
+  if (!world) {
+    RenderStats stats;
+    Settings made = settings;
+    made.indirect.vpls = vpls_asked();
+    world = make_world(scene_, made, stats);
+    trace_vpls(*world, made, 0, stats);
+  }
+  return *world;
+}
+
+const World& SubjectStudy::world(const Settings& settings) { return mutable_world(settings); }
+
+std::size_t SubjectStudy::lights(const World& world) const {
+  return subject_.vpls ? world.vpls.view().vpls.size() : world.lights.view().emitters.size();
+}
+
+int SubjectStudy::vpls_asked() const { return few_lights_ ? kFewVpls : kManyVpls; }
+
+void SubjectStudy::make_tiles(int size) {
+  const Settings settings = subject_settings(subject_, uniform_method(), 1);
+  const World& seen = world(settings);
+  const CameraView camera = make_camera_view(seen.camera, settings.width, settings.height);
+  const auto start = [&](int i, int length) {
+    const int centre = (2 * i + 1) * length / (2 * kTilesAlongSide);
+    return (centre - size / 2) / kTileAlign * kTileAlign;
+  };
+  for (int j = 0; j < kTilesAlongSide; ++j)
+    for (int i = 0; i < kTilesAlongSide; ++i) {
+      const int x = start(i, settings.width), y = start(j, settings.height);
+      Tile tile{{x, y, x + size, y + size}, {}, {}};
+      const auto n = static_cast<std::size_t>(tile.window.count());
+      std::vector<Ray> rays(n);
+      std::vector<Hit> hits(n);
+      tile.surfaces.resize(n);
+      tile.pixels.resize(n);
+      launch(tile.window.count(), CameraKernel{camera, tile.window, rays, tile.pixels, 0, 0, false});
+      seen.tracer.closest(rays, hits, Coherence::kCoherent);
+      launch(tile.window.count(),
+             SurfaceKernel{seen.arrays.view(), rays, hits, tile.surfaces, settings.force_diffuse});
+      tiles_.push_back(std::move(tile));
+    }
+}
+
+TileLight SubjectStudy::sample(const Settings& settings, int image) {
+  struct Buffers {
+    DirectBuffers direct;
+    IndirectBuffers indirect;
+    std::vector<vec3> light;
+  };
+  static tbb::enumerable_thread_specific<Buffers> all_buffers;  // warm from image to image
+  for (Buffers& b : all_buffers) b.direct.rays = b.indirect.rays = 0;
+  const World& world = this->world(settings);
+  const DirectLighting direct = make_direct_lighting(world, settings, image);
+  const IndirectLighting indirect = make_indirect_lighting(world, settings, image);
+  TileLight result;
+  result.light = {tile_size_, tile_size_ * static_cast<int>(tiles_.size()), {}, subject_.scene};
+  result.light.rgb.resize(3 * static_cast<std::size_t>(result.light.width) *
+                          static_cast<std::size_t>(result.light.height));
+  double before = 0, cuts = 0, all = 0;
+  const auto times = [&](const Buffers& b) {
+    return subject_.vpls ? std::pair(cut_ms(b.indirect), cut_ms(b.indirect) + split_ms(b.indirect) +
+                                                             b.indirect.select_ms + b.indirect.trace_ms)
+                         : std::pair(cut_ms(b.direct), cut_ms(b.direct) + split_ms(b.direct) +
+                                                           b.direct.select_ms + b.direct.trace_ms);
+  };
+  for (const Buffers& b : all_buffers) {
+    cuts -= times(b).first;
+    before += times(b).second;
+  }
+  const Stopwatch watch;
+  launch(
+      static_cast<int>(tiles_.size()),
+      [&](int t) {
+        tbb::this_task_arena::isolate([&] {
+          const Tile& tile = tiles_[static_cast<std::size_t>(t)];
+          Buffers& b = all_buffers.local();
+          b.light.assign(tile.surfaces.size(), vec3(0));
+          if (subject_.vpls) {
+            IndirectLighting of_tile = indirect;
+            set_window(of_tile, tile.window);
+            add_indirect_light(of_tile, tile.surfaces, tile.pixels, kDimIndirect, b.indirect, b.light);
+          } else {
+            DirectLighting of_tile = direct;
+            set_window(of_tile, tile.window);
+            add_direct_light(of_tile, tile.surfaces, tile.pixels, kDimLight, b.direct, b.light);
+          }
+          for (std::size_t i = 0; i < b.light.size(); ++i) {
+            const Pixel pixel = pixel_of_index(tile.window, static_cast<int>(i));
+            const int row = t * tile_size_ + pixel.y - tile.window.y0;
+            const auto at = 3 * static_cast<std::size_t>(row * tile_size_ + pixel.x - tile.window.x0);
+            for (int c = 0; c < 3; ++c) result.light.rgb[at + static_cast<std::size_t>(c)] = b.light[i][c];
+          }
+        });
+      },
+      1);
+  result.wall_ms = watch.ms();
+  for (const Buffers& b : all_buffers) {
+    cuts += times(b).first;
+    all += times(b).second;
+    result.rays += subject_.vpls ? b.indirect.rays : b.direct.rays;
+  }
+  result.cut_share = cuts / (all - before);
+  return result;
+}
+
+SubjectStudy::Converged SubjectStudy::converge(const Settings& settings, int first, int images) {
+  std::vector<Mean> values, blocks;
+  RgbImage like, block;
+  for (int image = 0; image < images; ++image) {
+    like = sample(settings, first + image).light;
+    block = halved(like);
+    add_to(values, like);
+    add_to(blocks, block);
+  }
+  return {means_of(values, like), mean_variance(values), mean_variance(blocks)};
+}
+
+const SubjectStudy::Converged& SubjectStudy::reference() {
+  if (!reference_) {
+    const Settings settings = subject_settings(subject_, perfect_cut(Variant::kOurs, false), kReferenceSpp);
+    reference_ = std::make_unique<Converged>(converge(settings, kReferenceNumber, kReferenceImages));
+    fmt::print(stderr, "  reference of {}: standard error {:.2g}\n", subject_.scene,
+               std::sqrt(reference_->variance));
+  }
+  return *reference_;
+}
+
+double SubjectStudy::tone_mapped_tiles_ssim(const RgbImage& light) const {
+  const ToneMap tone{subject_.exposure_ev, ToneCurve::kFilmic};
+  const auto values = 3 * static_cast<std::ptrdiff_t>(tile_size_ * tile_size_);
+  const auto tile_of = [&](const RgbImage& image, std::size_t t) {
+    const auto first = image.rgb.begin() + static_cast<std::ptrdiff_t>(t) * values;
+    return RgbImage{tile_size_, tile_size_, std::vector<float>(first, first + values), image.name};
+  };
+  double sum = 0;
+  for (std::size_t t = 0; t < tiles_.size(); ++t)
+    sum += tone_mapped_ssim(tile_of(reference_->light, t), tile_of(light, t), tone);
+  return sum / static_cast<double>(tiles_.size());
+}
+
+std::vector<Measured> SubjectStudy::measure(const std::vector<Entry>& entries, int images) {
+  std::vector<Measured> results;
+  for (const Entry& entry : entries) {
+    Measured& result = results.emplace_back();
+    result.entry = entry;
+    result.missing = why_missing(subject_, entry.method, entry.spp);
+  }
+  const std::string no_reference = why_missing(subject_, perfect_cut(Variant::kOurs, false), kReferenceSpp);
+  for (Measured& result : results)
+    if (result.ok()) result.missing = no_reference;
+  if (!no_reference.empty()) return results;
+
+  const Converged& truth = reference();
+  const RgbImage truth_blocks = halved(truth.light);
+  const double pixels = tile_size_ * tile_size_ * static_cast<double>(tiles_.size());
+  const double scale = kImageWidth * kImageHeight / pixels;
+  for (int image = 0; image <= images; ++image)
+    for (Measured& result : results) {
+      if (!result.ok()) continue;
+      const TileLight drawn =
+          sample(subject_settings(subject_, result.entry.method, result.entry.spp), image);
+      if (image == 0) continue;
+      result.squared.push_back(squared_error(truth.light, truth.variance, drawn.light));
+      result.squared_block.push_back(squared_error(truth_blocks, truth.block_variance, halved(drawn.light)));
+      result.ssim.push_back(tone_mapped_tiles_ssim(drawn.light));
+      result.ms.push_back(drawn.wall_ms * scale);
+      result.cut_share.push_back(drawn.cut_share);
+      result.rays += static_cast<double>(drawn.rays) / (pixels * images);
+    }
+  return results;
+}
+
+// --- relations -------------------------------------------------------------------------------------------------
+
+Estimate mse_ratio(const Measured& a, const Measured& b) { return ratio_of_means(a.squared, b.squared); }
+
+Estimate equal_time_ratio(const Measured& a, const Measured& b) { return ratio_of_means(a.cost(), b.cost()); }
+
+Relation missing_relation(int check, const std::string& scene, const std::string& what,
+                          const std::string& published, const std::string& reason) {
+  return {check, scene, what, published, std::nan(""), 0, {}, {}, "not measured: " + reason};
+}
+
+std::string measured_text(const Measured& measured) {
+  return fmt::format("{} spp, MSE {:.4g}, SSIM {:.3f}, {:.0f} ms", measured.entry.spp,
+                     mean_of(measured.squared).value, mean_of(measured.ssim).value, measured.ms_median());
+}
+
+}  // namespace lumigrove::bench
