@@ -55,32 +55,38 @@ struct PairReport {
 
 // --- 12: shared cuts ---------------------------------------------------------------------------------------------
 
-// Blocks of so many pixels' edge, at the samples of figure 9.
-constexpr int kShares[] = {1, 2, 4, 8, 16, 32};
-constexpr std::size_t kPerPixel = 0, kEight = 3, kLargest = 5;
-constexpr int kSharingSpp = 32, kSharingImages = 4;
+// At the samples of figure 9.
+constexpr int kSharingSpp = 32, kSharingImages = 3;
+
+// Blocks of so many pixels' edge; a cut for each pixel comes first, then larger and larger ones.
+std::vector<int> shares_of(Variant variant) {
+  return variant == Variant::kPaper ? std::vector{1, 2, 4, 8, 16, 32} : std::vector{1, 8, 32};
+}
+
+double share_of_cuts(const Measured& m) { return m.ok() ? median(m.cut_share) : 0; }
 
 void report_sharing(const Subject& subject, Variant variant, const Report& report) {
+  const std::vector<int> shares = shares_of(variant);
   std::vector<Entry> entries;
-  for (const int share : kShares)
+  for (const int share : shares)
     entries.push_back({with(perfect_cut(variant, false), fmt::format("k = {}", share),
                             {{"cut_share", std::to_string(share)}}),
                        kSharingSpp});
   const std::vector<Measured> all = SubjectStudy::of(subject).measure(entries, kSharingImages);
+  const Measured &per_pixel = all.front(), &eight = all[variant == Variant::kPaper ? 3 : 1],
+                 &largest = all.back();
   const PairReport pair{12, subject, variant, report};
-  const auto share_of_cuts = [](const Measured& m) { return m.ok() ? median(m.cut_share) : 0; };
   for (std::size_t i = 1; i < all.size(); ++i)
-    pair.mse(fmt::format("32 spp: MSE of a cut for {0}x{0} pixels / for each", kShares[i]), "", all[i],
-             all[kPerPixel], {}, {},
+    pair.mse(fmt::format("32 spp: MSE of a cut for {0}x{0} pixels / for each", shares[i]), "", all[i],
+             per_pixel, {}, {},
              fmt::format("selection of cuts: {:.2g} % of the time and {:.2g} %", 100 * share_of_cuts(all[i]),
-                         100 * share_of_cuts(all[kPerPixel])));
-  pair.mse("32 spp: MSE k = 32 / k = 8", "above 1", all[kLargest], all[kEight], 1, {});
-  pair.time("32 spp: time k = 8 / a cut for each pixel", value_text(31.3 / 37.8), all[kEight], all[kPerPixel],
-            {}, 1);
+                         100 * share_of_cuts(per_pixel)));
+  pair.mse("32 spp: MSE k = 32 / k = 8", "above 1", largest, eight, 1, {});
+  pair.time("32 spp: time k = 8 / a cut for each pixel", value_text(31.3 / 37.8), eight, per_pixel, {}, 1);
   pair.add(
-      "32 spp, k = 8: selection of cuts / sampling", "below 0.02", all[kEight], all[kEight],
+      "32 spp, k = 8: selection of cuts / sampling", "below 0.02", eight, eight,
       [&] {
-        return Estimate{share_of_cuts(all[kEight]), 0};
+        return Estimate{share_of_cuts(eight), 0};
       },
       {}, 0.03);
 }

@@ -77,31 +77,29 @@ std::array<Method, kPlaces> methods_of(const Subject& subject, Variant variant) 
           perfect_root(variant, subject.two_level), perfect_cut(variant, subject.two_level)};
 }
 
-bool uses_cuts(const Method& method) {
-  return std::find(method.values.begin(), method.values.end(),
-                   std::pair<std::string, std::string>{"selection", "cut"}) != method.values.end();
-}
-
 int samples_in(double budget_ms, const Measured& at_8) {
   const int spp = static_cast<int>(std::lround(budget_ms / at_8.ms_median() * at_8.entry.spp));
-  return std::clamp(spp, 1, uses_cuts(at_8.entry.method) ? kMostCutNodes : 4096);
+  return std::clamp(spp, 1, at_8.entry.uses_cuts() ? kMostCutNodes : 4096);
 }
 
 struct Rows {
   Row at_8, at_equal_time;
 };
 
-// All entries of both variants take turns.
+// Those of both variants take turns; what does not differ between them is measured once.
 std::array<Rows, 2> measure_rows(const Subject& subject) {
+  constexpr std::array<std::array<std::size_t, kPlaces>, 2> kNumbers = {{{0, 1, 2, 3, 4}, {0, 1, 5, 6, 7}}};
   SubjectStudy& study = SubjectStudy::of(subject);
-  std::vector<Entry> entries;
-  for (const Variant variant : kVariants)
-    for (const Method& method : methods_of(subject, variant)) entries.push_back({method, kSpp});
+  std::vector<Entry> entries(8);
+  for (std::size_t v = 0; v < 2; ++v) {
+    const auto methods = methods_of(subject, kVariants[v]);
+    for (std::size_t p = 0; p < kPlaces; ++p) entries[kNumbers[v][p]] = {methods[p], kSpp};
+  }
   const std::vector<Measured> at_8 = study.measure(entries, kImages);
-  const Measured& paper = at_8[kPerfectCut];
+  const Measured& reference = at_8[kPerfectCut];
   std::vector<Measured> later = at_8;
-  if (paper.ok()) {
-    const double budget = paper.ms_median() * kEqualTimeSpp / kSpp;
+  if (reference.ok()) {
+    const double budget = reference.ms_median() * kEqualTimeSpp / kSpp;
     for (std::size_t i = 0; i < entries.size(); ++i)
       if (at_8[i].ok()) entries[i].spp = samples_in(budget, at_8[i]);
     later = study.measure(entries, kImages);
@@ -109,8 +107,8 @@ std::array<Rows, 2> measure_rows(const Subject& subject) {
   std::array<Rows, 2> rows;
   for (std::size_t v = 0; v < 2; ++v)
     for (std::size_t p = 0; p < kPlaces; ++p) {
-      rows[v].at_8[p] = at_8[v * kPlaces + p];
-      rows[v].at_equal_time[p] = later[v * kPlaces + p];
+      rows[v].at_8[p] = at_8[kNumbers[v][p]];
+      rows[v].at_equal_time[p] = later[kNumbers[v][p]];
     }
   return rows;
 }

@@ -9,7 +9,6 @@
 #include "base/stopwatch.h"
 #include "bench.h"
 #include "device/device.h"
-#include "scene/surface_kernel.h"
 
 namespace lumigrove::bench {
 namespace {
@@ -25,13 +24,18 @@ constexpr int kReferenceNumber = 1 << 20;  // beyond the numbers of the images t
 // Cuts of virtual point lights are looked up as those of emitters are.
 template <class Lighting>
 void set_window(Lighting& lighting, const PixelWindow& window) {
-  if constexpr (requires { lighting.lookup.window; }) lighting.lookup.window = window;
+  if constexpr (requires { lighting.lookup.window; })
+    lighting.lookup.window = window;
+  else if constexpr (requires { lighting.light_tree.lookup.window; })
+    lighting.light_tree.lookup.window = window;
 }
 
 template <class Buffers>
 double cut_ms(const Buffers& buffers) {
   if constexpr (requires { buffers.cut_ms; })
     return buffers.cut_ms;
+  else if constexpr (requires { buffers.light_tree.cut_ms; })
+    return buffers.light_tree.cut_ms;
   else
     return 0;
 }
@@ -39,6 +43,8 @@ template <class Buffers>
 double split_ms(const Buffers& buffers) {
   if constexpr (requires { buffers.split_ms; })
     return buffers.split_ms;
+  else if constexpr (requires { buffers.light_tree.split_ms; })
+    return buffers.light_tree.split_ms;
   else
     return 0;
 }
@@ -56,7 +62,10 @@ double mean_variance(const std::vector<Mean>& values) {
 
 void add_to(std::vector<Mean>& values, const RgbImage& image) {
   values.resize(image.rgb.size());
-  for (std::size_t i = 0; i < values.size(); ++i) values[i].add(static_cast<double>(image.rgb[i]));
+  launch(static_cast<int>(values.size()), [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    values[i].add(static_cast<double>(image.rgb[i]));
+  });
 }
 
 RgbImage means_of(const std::vector<Mean>& values, RgbImage like) {
@@ -84,6 +93,26 @@ RgbImage halved(const RgbImage& image) {
 double squared_error(const RgbImage& reference, double reference_variance, const RgbImage& test) {
   const double error = rmse(reference, test);
   return error * error - reference_variance;
+}
+
+double mean_ssim(const std::vector<RgbImage>& references, const std::vector<RgbImage>& tests) {
+  std::vector<double> values(tests.size());
+  launch(
+      static_cast<int>(tests.size()),
+      [&](int t) {
+        const auto i = static_cast<std::size_t>(t);
+        values[i] = ssim(references[i], tests[i]);
+      },
+      1);
+  return mean_of(values).value;
+}
+
+// The last value given for a key; empty where there is none.
+std::string value_of(const Method& method, const std::string& key) {
+  std::string found;
+  for (const auto& [name, value] : method.values)
+    if (name == key) found = value;
+  return found;
 }
 
 }  // namespace
@@ -170,6 +199,16 @@ std::string why_missing(const Subject& subject, const Method& method, int spp) {
   }
 }
 
+bool Entry::uses_cuts() const { return value_of(method, "selection") == "cut"; }
+
+double Measured::samples() const {
+  const std::string split = value_of(entry.method, "split"),
+                    interleave = value_of(entry.method, "cut_interleave");
+  if (!split.empty() && split != "0") return rays;
+  const int m = interleave.empty() ? 1 : std::stoi(interleave);
+  return static_cast<double>(entry.spp) / (m * m);
+}
+
 double Measured::ms_median() const { return median(ms); }
 
 std::vector<double> Measured::cost() const {
@@ -223,7 +262,6 @@ int SubjectStudy::vpls_asked() const { return few_lights_ ? kFewVpls : kManyVpls
 void SubjectStudy::make_tiles(int size) {
   const Settings settings = subject_settings(subject_, uniform_method(), 1);
   const World& seen = world(settings);
-  const CameraView camera = make_camera_view(seen.camera, settings.width, settings.height);
   const auto start = [&](int i, int length) {
     const int centre = (2 * i + 1) * length / (2 * kTilesAlongSide);
     return (centre - size / 2) / kTileAlign * kTileAlign;
@@ -231,17 +269,8 @@ void SubjectStudy::make_tiles(int size) {
   for (int j = 0; j < kTilesAlongSide; ++j)
     for (int i = 0; i < kTilesAlongSide; ++i) {
       const int x = start(i, settings.width), y = start(j, settings.height);
-      Tile tile{{x, y, x + size, y + size}, {}, {}};
-      const auto n = static_cast<std::size_t>(tile.window.count());
-      std::vector<Ray> rays(n);
-      std::vector<Hit> hits(n);
-      tile.surfaces.resize(n);
-      tile.pixels.resize(n);
-      launch(tile.window.count(), CameraKernel{camera, tile.window, rays, tile.pixels, 0, 0, false});
-      seen.tracer.closest(rays, hits, Coherence::kCoherent);
-      launch(tile.window.count(),
-             SurfaceKernel{seen.arrays.view(), rays, hits, tile.surfaces, settings.force_diffuse});
-      tiles_.push_back(std::move(tile));
+      const PixelWindow window{x, y, x + size, y + size};
+      tiles_.push_back({window, see_surfaces(seen, settings, window, false)});
     }
 }
 
@@ -278,15 +307,16 @@ TileLight SubjectStudy::sample(const Settings& settings, int image) {
         tbb::this_task_arena::isolate([&] {
           const Tile& tile = tiles_[static_cast<std::size_t>(t)];
           Buffers& b = all_buffers.local();
-          b.light.assign(tile.surfaces.size(), vec3(0));
+          b.light.assign(tile.seen.surfaces.size(), vec3(0));
           if (subject_.vpls) {
             IndirectLighting of_tile = indirect;
             set_window(of_tile, tile.window);
-            add_indirect_light(of_tile, tile.surfaces, tile.pixels, kDimIndirect, b.indirect, b.light);
+            add_indirect_light(of_tile, tile.seen.surfaces, tile.seen.pixels, kDimIndirect, b.indirect,
+                               b.light);
           } else {
             DirectLighting of_tile = direct;
             set_window(of_tile, tile.window);
-            add_direct_light(of_tile, tile.surfaces, tile.pixels, kDimLight, b.direct, b.light);
+            add_direct_light(of_tile, tile.seen.surfaces, tile.seen.pixels, kDimLight, b.direct, b.light);
           }
           for (std::size_t i = 0; i < b.light.size(); ++i) {
             const Pixel pixel = pixel_of_index(tile.window, static_cast<int>(i));
@@ -323,23 +353,22 @@ const SubjectStudy::Converged& SubjectStudy::reference() {
   if (!reference_) {
     const Settings settings = subject_settings(subject_, perfect_cut(Variant::kOurs, false), kReferenceSpp);
     reference_ = std::make_unique<Converged>(converge(settings, kReferenceNumber, kReferenceImages));
+    reference_tiles_ = tone_mapped_tiles(reference_->light);
     fmt::print(stderr, "  reference of {}: standard error {:.2g}\n", subject_.scene,
                std::sqrt(reference_->variance));
   }
   return *reference_;
 }
 
-double SubjectStudy::tone_mapped_tiles_ssim(const RgbImage& light) const {
+std::vector<RgbImage> SubjectStudy::tone_mapped_tiles(const RgbImage& light) const {
   const ToneMap tone{subject_.exposure_ev, ToneCurve::kFilmic};
-  const auto values = 3 * static_cast<std::ptrdiff_t>(tile_size_ * tile_size_);
-  const auto tile_of = [&](const RgbImage& image, std::size_t t) {
-    const auto first = image.rgb.begin() + static_cast<std::ptrdiff_t>(t) * values;
-    return RgbImage{tile_size_, tile_size_, std::vector<float>(first, first + values), image.name};
-  };
-  double sum = 0;
-  for (std::size_t t = 0; t < tiles_.size(); ++t)
-    sum += tone_mapped_ssim(tile_of(reference_->light, t), tile_of(light, t), tone);
-  return sum / static_cast<double>(tiles_.size());
+  const auto values = 3 * static_cast<std::ptrdiff_t>(tile_size_) * tile_size_;
+  std::vector<RgbImage> tiles;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    const auto first = light.rgb.begin() + static_cast<std::ptrdiff_t>(t) * values;
+    tiles.push_back({tile_size_, tile_size_, tone_map({first, first + values}, tone), light.name});
+  }
+  return tiles;
 }
 
 std::vector<Measured> SubjectStudy::measure(const std::vector<Entry>& entries, int images) {
@@ -358,17 +387,18 @@ std::vector<Measured> SubjectStudy::measure(const std::vector<Entry>& entries, i
   const RgbImage truth_blocks = halved(truth.light);
   const double pixels = tile_size_ * tile_size_ * static_cast<double>(tiles_.size());
   const double scale = kImageWidth * kImageHeight / pixels;
-  for (int image = 0; image <= images; ++image)
+  for (int image = 0; image < images; ++image)
     for (Measured& result : results) {
       if (!result.ok()) continue;
       const TileLight drawn =
           sample(subject_settings(subject_, result.entry.method, result.entry.spp), image);
-      if (image == 0) continue;
       result.squared.push_back(squared_error(truth.light, truth.variance, drawn.light));
       result.squared_block.push_back(squared_error(truth_blocks, truth.block_variance, halved(drawn.light)));
-      result.ssim.push_back(tone_mapped_tiles_ssim(drawn.light));
-      result.ms.push_back(drawn.wall_ms * scale);
-      result.cut_share.push_back(drawn.cut_share);
+      result.ssim.push_back(mean_ssim(reference_tiles_, tone_mapped_tiles(drawn.light)));
+      if (image > 0) {
+        result.ms.push_back(drawn.wall_ms * scale);
+        result.cut_share.push_back(drawn.cut_share);
+      }
       result.rays += static_cast<double>(drawn.rays) / (pixels * images);
     }
   return results;
@@ -385,9 +415,12 @@ Relation missing_relation(int check, const std::string& scene, const std::string
   return {check, scene, what, published, std::nan(""), 0, {}, {}, "not measured: " + reason};
 }
 
-std::string measured_text(const Measured& measured) {
-  return fmt::format("{} spp, MSE {:.4g}, SSIM {:.3f}, {:.0f} ms", measured.entry.spp,
-                     mean_of(measured.squared).value, mean_of(measured.ssim).value, measured.ms_median());
+std::string measured_text(const Measured& m) {
+  const double samples = m.samples(), mse = mean_of(m.squared).value;
+  return fmt::format("{} spp, MSE {:.4g}, SSIM {:.3f}, {:.0f} ms; a {}: variance {:.3g}, {:.0f} ns",
+                     m.entry.spp, mse, mean_of(m.ssim).value, m.ms_median(),
+                     samples == m.rays ? "shadow ray" : "sample", mse * samples,
+                     m.ms_median() * 1e6 / (samples * kImageWidth * kImageHeight));
 }
 
 }  // namespace lumigrove::bench
