@@ -130,14 +130,14 @@ class StrategyReport {
  private:
   // Numbers to be read.
   void tables() {
-    for (std::size_t p = variant_ == kVariants[0] ? 0 : kUnbalancedCut; p < kPlaces; ++p) {
+    for (std::size_t p = first(); p < kPlaces; ++p) {
       const Measured& at_8 = rows_.at_8[p];
       add(
           at_8.entry.method.name + ", 8 spp: MSE", fmt::format("{:.3f}", table_.mse8[p]), {&at_8},
           [&] { return mean_of(at_8.squared); }, {}, {},
           fmt::format("published: SSIM {:.3f}, {} ms", table_.ssim8[p], table_.ms8[p]));
     }
-    for (std::size_t p = variant_ == kVariants[0] ? 0 : kUnbalancedCut; p < kPlaces; ++p) {
+    for (std::size_t p = first(); p < kPlaces; ++p) {
       const Measured& later = rows_.at_equal_time[p];
       add(
           later.entry.method.name + ", equal time: MSE", fmt::format("{:.3f}", table_.mse[p]), {&later},
@@ -148,7 +148,7 @@ class StrategyReport {
 
   void equal_samples() {
     for (const Place p : {kUnbalancedRoot, kUnbalancedCut, kPerfectRoot, kPerfectCut})
-      mse8(fmt::format("8 spp: MSE {} / uniform", name(p)), p, kUniform, {}, 1);
+      if (p >= first()) mse8(fmt::format("8 spp: MSE {} / uniform", name(p)), p, kUniform, {}, 1);
     const auto noisier = table_.unbalanced_quieter ? std::optional<double>(1) : std::nullopt;
     mse8("8 spp, from the root: MSE perfect / unbalanced", kPerfectRoot, kUnbalancedRoot, noisier, {});
     mse8("8 spp, cuts: MSE perfect / unbalanced", kPerfectCut, kUnbalancedCut, noisier, {});
@@ -168,6 +168,9 @@ class StrategyReport {
     }
     ssim();
   }
+
+  // Uniform sampling and the unbalanced tree without cuts are the same in both variants: told of once.
+  std::size_t first() const { return variant_ == kVariants[0] ? 0 : kUnbalancedCut; }
 
   std::string name(Place p) const { return rows_.at_8[p].entry.method.name; }
 
@@ -217,7 +220,11 @@ class StrategyReport {
   void add(const std::string& what, const std::string& published, std::vector<const Measured*> sides,
            const Value& value, std::optional<double> at_least, std::optional<double> at_most,
            const std::string& more = "") {
-    const std::string title = fmt::format("{} ({})", what, variant_name(variant_));
+    const bool varies = std::any_of(sides.begin(), sides.end(), [&](const Measured* side) {
+      return side != &rows_.at_8[kUniform] && side != &rows_.at_8[kUnbalancedRoot] &&
+             side != &rows_.at_equal_time[kUniform] && side != &rows_.at_equal_time[kUnbalancedRoot];
+    });
+    const std::string title = varies ? fmt::format("{} ({})", what, variant_name(variant_)) : what;
     std::string note;
     for (const Measured* side : sides) {
       if (!side->ok()) {

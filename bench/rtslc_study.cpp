@@ -30,23 +30,25 @@ void set_window(Lighting& lighting, const PixelWindow& window) {
     lighting.light_tree.lookup.window = window;
 }
 
+// What buffers have counted since they were made.
+struct Counters {
+  double cut_ms = 0, ms = 0;
+  std::uint64_t rays = 0;
+
+  Counters& operator+=(const Counters& other) {
+    cut_ms += other.cut_ms;
+    ms += other.ms;
+    rays += other.rays;
+    return *this;
+  }
+};
+
 template <class Buffers>
-double cut_ms(const Buffers& buffers) {
-  if constexpr (requires { buffers.cut_ms; })
-    return buffers.cut_ms;
-  else if constexpr (requires { buffers.light_tree.cut_ms; })
-    return buffers.light_tree.cut_ms;
-  else
-    return 0;
-}
-template <class Buffers>
-double split_ms(const Buffers& buffers) {
-  if constexpr (requires { buffers.split_ms; })
-    return buffers.split_ms;
-  else if constexpr (requires { buffers.light_tree.split_ms; })
-    return buffers.light_tree.split_ms;
-  else
-    return 0;
+Counters counters_of(const Buffers& b) {
+  Counters counters{0, b.select_ms + b.trace_ms, b.rays};
+  if constexpr (requires { b.cut_ms + b.split_ms; }) counters += {b.cut_ms, b.cut_ms + b.split_ms, 0};
+  if constexpr (requires { b.light_tree.cut_ms; }) counters += counters_of(b.light_tree);
+  return counters;
 }
 
 bool is_setting(const std::string& key) {
@@ -93,18 +95,6 @@ RgbImage halved(const RgbImage& image) {
 double squared_error(const RgbImage& reference, double reference_variance, const RgbImage& test) {
   const double error = rmse(reference, test);
   return error * error - reference_variance;
-}
-
-double mean_ssim(const std::vector<RgbImage>& references, const std::vector<RgbImage>& tests) {
-  std::vector<double> values(tests.size());
-  launch(
-      static_cast<int>(tests.size()),
-      [&](int t) {
-        const auto i = static_cast<std::size_t>(t);
-        values[i] = ssim(references[i], tests[i]);
-      },
-      1);
-  return mean_of(values).value;
 }
 
 // The last value given for a key; empty where there is none.
@@ -281,7 +271,6 @@ TileLight SubjectStudy::sample(const Settings& settings, int image) {
     std::vector<vec3> light;
   };
   static tbb::enumerable_thread_specific<Buffers> all_buffers;  // warm from image to image
-  for (Buffers& b : all_buffers) b.direct.rays = b.indirect.rays = 0;
   const World& world = this->world(settings);
   const DirectLighting direct = make_direct_lighting(world, settings, image);
   const IndirectLighting indirect = make_indirect_lighting(world, settings, image);
@@ -289,17 +278,12 @@ TileLight SubjectStudy::sample(const Settings& settings, int image) {
   result.light = {tile_size_, tile_size_ * static_cast<int>(tiles_.size()), {}, subject_.scene};
   result.light.rgb.resize(3 * static_cast<std::size_t>(result.light.width) *
                           static_cast<std::size_t>(result.light.height));
-  double before = 0, cuts = 0, all = 0;
-  const auto times = [&](const Buffers& b) {
-    return subject_.vpls ? std::pair(cut_ms(b.indirect), cut_ms(b.indirect) + split_ms(b.indirect) +
-                                                             b.indirect.select_ms + b.indirect.trace_ms)
-                         : std::pair(cut_ms(b.direct), cut_ms(b.direct) + split_ms(b.direct) +
-                                                           b.direct.select_ms + b.direct.trace_ms);
+  const auto count = [&] {
+    Counters sum;
+    for (const Buffers& b : all_buffers) (sum += counters_of(b.direct)) += counters_of(b.indirect);
+    return sum;
   };
-  for (const Buffers& b : all_buffers) {
-    cuts -= times(b).first;
-    before += times(b).second;
-  }
+  const Counters before = count();
   const Stopwatch watch;
   launch(
       static_cast<int>(tiles_.size()),
@@ -328,12 +312,9 @@ TileLight SubjectStudy::sample(const Settings& settings, int image) {
       },
       1);
   result.wall_ms = watch.ms();
-  for (const Buffers& b : all_buffers) {
-    cuts += times(b).first;
-    all += times(b).second;
-    result.rays += subject_.vpls ? b.indirect.rays : b.direct.rays;
-  }
-  result.cut_share = cuts / (all - before);
+  const Counters after = count();
+  result.cut_share = (after.cut_ms - before.cut_ms) / (after.ms - before.ms);
+  result.rays = after.rays - before.rays;
   return result;
 }
 
@@ -353,22 +334,29 @@ const SubjectStudy::Converged& SubjectStudy::reference() {
   if (!reference_) {
     const Settings settings = subject_settings(subject_, perfect_cut(Variant::kOurs, false), kReferenceSpp);
     reference_ = std::make_unique<Converged>(converge(settings, kReferenceNumber, kReferenceImages));
-    reference_tiles_ = tone_mapped_tiles(reference_->light);
     fmt::print(stderr, "  reference of {}: standard error {:.2g}\n", subject_.scene,
                std::sqrt(reference_->variance));
   }
   return *reference_;
 }
 
-std::vector<RgbImage> SubjectStudy::tone_mapped_tiles(const RgbImage& light) const {
-  const ToneMap tone{subject_.exposure_ev, ToneCurve::kFilmic};
+RgbImage SubjectStudy::tone_mapped_tile(const RgbImage& light, std::size_t tile) const {
   const auto values = 3 * static_cast<std::ptrdiff_t>(tile_size_) * tile_size_;
-  std::vector<RgbImage> tiles;
-  for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    const auto first = light.rgb.begin() + static_cast<std::ptrdiff_t>(t) * values;
-    tiles.push_back({tile_size_, tile_size_, tone_map({first, first + values}, tone), light.name});
-  }
-  return tiles;
+  const auto first = light.rgb.begin() + static_cast<std::ptrdiff_t>(tile) * values;
+  return {tile_size_, tile_size_,
+          tone_map({first, first + values}, {subject_.exposure_ev, ToneCurve::kFilmic}), light.name};
+}
+
+double SubjectStudy::mean_ssim(const RgbImage& light) const {
+  std::vector<double> values(tiles_.size());
+  launch(
+      static_cast<int>(tiles_.size()),
+      [&](int tile) {
+        const auto t = static_cast<std::size_t>(tile);
+        values[t] = ssim(tone_mapped_tile(reference_->light, t), tone_mapped_tile(light, t));
+      },
+      1);
+  return mean_of(values).value;
 }
 
 std::vector<Measured> SubjectStudy::measure(const std::vector<Entry>& entries, int images) {
@@ -394,7 +382,7 @@ std::vector<Measured> SubjectStudy::measure(const std::vector<Entry>& entries, i
           sample(subject_settings(subject_, result.entry.method, result.entry.spp), image);
       result.squared.push_back(squared_error(truth.light, truth.variance, drawn.light));
       result.squared_block.push_back(squared_error(truth_blocks, truth.block_variance, halved(drawn.light)));
-      result.ssim.push_back(mean_ssim(reference_tiles_, tone_mapped_tiles(drawn.light)));
+      result.ssim.push_back(mean_ssim(drawn.light));
       if (image > 0) {
         result.ms.push_back(drawn.wall_ms * scale);
         result.cut_share.push_back(drawn.cut_share);

@@ -138,7 +138,8 @@ class SubjectStudy {
  private:
   void make_tiles(int size);
   const Converged& reference();
-  std::vector<RgbImage> tone_mapped_tiles(const RgbImage& light) const;
+  RgbImage tone_mapped_tile(const RgbImage& light, std::size_t tile) const;
+  double mean_ssim(const RgbImage& light) const;
 
   Subject subject_;
   bool few_lights_;
@@ -147,7 +148,6 @@ class SubjectStudy {
   std::map<std::string, std::unique_ptr<World>> worlds_;
   std::vector<Tile> tiles_;
   std::unique_ptr<Converged> reference_;
-  std::vector<RgbImage> reference_tiles_;  // tone-mapped
 };
 
 // Ratio of mean squared errors, at equal samples or at equal time; of images of equal numbers.
