@@ -16,7 +16,7 @@ namespace lumigrove {
 
 // The axes of the space of methods (docs/papers.md); the table in registry.cpp holds their names.
 enum class Hierarchy : std::uint8_t { kNone, kPerfect, kTwoLevel, kSaoh, kAgglomerative };
-enum class Weights : std::uint8_t { kMinMax, kSaoh };
+enum class Weights : std::uint8_t { kMinMax, kSaoh, kYuksel };
 enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut };
 enum class CutBound : std::uint8_t { kNearest, kExact, kChildren };
 enum class Transport : std::uint8_t { kNone, kPath, kVpl };

@@ -70,11 +70,15 @@ DirectLighting away_from_camera(DirectLighting direct) {
   return direct;
 }
 
-// Paths go on from the first hits as settings.indirect asks; with MIS their first ray also finds direct light.
-PathTracing make_path_tracing(const Settings& settings, const DirectLighting& direct) {
+// Paths go on from the first hits as settings.indirect asks; with MIS their first ray also finds direct light, beside
+// the samples that were taken with `buffers`.
+PathTracing make_path_tracing(const Settings& settings, const DirectLighting& direct,
+                              const DirectBuffers& buffers) {
   PathTracing tracing;
   tracing.lighting = away_from_camera(direct);
-  tracing.first_spp = direct.spp;
+  tracing.first_spp = direct.use_cuts ? direct.lookup.passes(direct.cut.size) : direct.spp;
+  if (direct.use_cuts) tracing.first_cuts = samples_below(buffers.cuts, direct.lookup);
+  if (direct.use_split) tracing.first_split = {buffers.split_entries, buffers.split_counts, direct.split.cap};
   tracing.max_bounces = settings.indirect.transport == Transport::kPath ? settings.indirect.max_bounces : 0;
   tracing.roulette_start = settings.indirect.roulette_start;
   tracing.light_scale = settings.light_scale;
@@ -120,8 +124,8 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
   DirectLighting of_tile = direct;
   of_tile.lookup.window = tile;
   add_direct_light(of_tile, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
-  add_path_light(make_path_tracing(settings, direct), b.surfaces, b.pixels, b.path_buffers, b.direct,
-                 b.indirect);
+  add_path_light(make_path_tracing(settings, of_tile, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,
+                 b.direct, b.indirect);
   if (settings.indirect.transport == Transport::kVpl) {
     b.indirect_buffers.wants_traces = !film.walks.empty();
     add_indirect_light(indirect, b.surfaces, b.pixels, kDimIndirect, b.indirect_buffers, b.indirect);
@@ -193,7 +197,7 @@ bool uses_bvh(const DirectSettings& s) {
 }
 
 void build_light_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
-  const LightTree::Options options{settings.width, settings.cones, settings.mis};
+  const LightTree::Options options{settings.width, settings.cones, settings.mis, settings.weights};
   if (settings.hierarchy != Hierarchy::kTwoLevel) {
     world.tree.build(world.lights.view(), options);
     stats.structures.push_back(

@@ -235,9 +235,11 @@ std::vector<Setting> direct_rows() {
           "two are binary"),
       choice(
           "direct.weights", [](auto& s) -> auto& { return s.direct.weights; },
-          vector<pair<string, Weights>>{{"min-max", Weights::kMinMax}, {"saoh", Weights::kSaoh}},
-          "Weights of a node's children: mean of those at least and at greatest distance, or at the centre with bounds of the "
-          "angles (hierarchies saoh and agglomerative)"),
+          vector<pair<string, Weights>>{
+              {"min-max", Weights::kMinMax}, {"yuksel", Weights::kYuksel}, {"saoh", Weights::kSaoh}},
+          "Weights of a node's children: mean of those at least and at greatest distance; at the least, left out for all "
+          "of them when a box is wider than far; or at the centre with bounds of the angles (hierarchies saoh and "
+          "agglomerative)"),
       choice(
           "direct.width", [](auto& s) -> auto& { return s.direct.width; },
           vector<pair<string, int>>{{"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}},
@@ -433,7 +435,6 @@ void check_cuts(const DirectSettings& s) {
     throw Error("direct.selection 'cut' cuts one tree, but direct.hierarchy is 'two-level'; use 'perfect'");
   if (s.spp > kMaxCut)
     throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
-  if (s.mis) throw Error("direct.mis does not combine with cuts; set direct.selection 'root' or direct.mis false");
 }
 
 void check_light_bvh(const DirectSettings& s) {
@@ -443,10 +444,10 @@ void check_light_bvh(const DirectSettings& s) {
   if (s.selection != Selection::kRoot && s.selection != Selection::kCut) return;
   const bool bvh = s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative;
   if (s.weights == Weights::kSaoh && !bvh)
-    throw Error("direct.weights 'saoh' needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 'min-max'");
+    throw Error("direct.weights 'saoh' needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 'min-max' or "
+                "'yuksel'");
   if (s.split > 0 && !bvh)
     throw Error("direct.split needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 0");
-  if (s.split > 0 && s.mis) throw Error("direct.mis does not combine with splitting; set direct.split 0 or direct.mis false");
 }
 
 void check_vpls(const IndirectSettings& s) {

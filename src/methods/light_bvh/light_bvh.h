@@ -21,7 +21,7 @@ class LightBvh {
   struct Options {
     Hierarchy builder = Hierarchy::kSaoh;  // kSaoh or kAgglomerative
     Weights weights = Weights::kMinMax;
-    bool cones = true;  // of kMinMax
+    bool cones = true;  // not of kSaoh
   };
   // Buffers are reused by the next build.
   void build(const LightView& lights, const Options& options);
