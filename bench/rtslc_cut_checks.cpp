@@ -42,6 +42,11 @@ struct PairReport {
     add(
         what, published, a, b, [&] { return mse_ratio(a, b); }, at_least, at_most, more);
   }
+  // Bright samples, however rare, rule the squared error of linear colours, not this.
+  void ssim(const std::string& what, const std::string& published, const Measured& a, const Measured& b,
+            std::optional<double> at_least) const {
+    add(what, published, a, b, [&] { return mean_difference(a.ssim, b.ssim); }, at_least, {});
+  }
   void time(const std::string& what, const std::string& published, const Measured& a, const Measured& b,
             std::optional<double> at_least, std::optional<double> at_most) const {
     add(
@@ -105,6 +110,8 @@ void report_weights(const Subject& subject, Variant variant, const Report& repor
   const PairReport pair{12, subject, variant, report};
   pair.mse("8 spp, from the root: MSE min-max / Yuksel's weights", "below 1", all[0], all[1], {}, 1);
   pair.mse("8 spp, cuts: MSE min-max / Yuksel's weights", "below 1", all[2], all[3], {}, 1);
+  pair.ssim("8 spp, from the root: SSIM min-max - Yuksel's weights", "above 0", all[0], all[1], 0);
+  pair.ssim("8 spp, cuts: SSIM min-max - Yuksel's weights", "above 0", all[2], all[3], 0);
 }
 
 // --- 12: two levels ----------------------------------------------------------------------------------------------
@@ -124,6 +131,8 @@ void report_two_levels(const Subject& subject, Variant variant, bool sparse, con
   const std::optional<double> gain = sparse ? std::optional<double>(1) : std::nullopt;
   const std::optional<double> price = sparse ? std::optional<double>(1.1) : std::nullopt;
   pair.mse("8 spp, cuts: MSE two levels / one", sparse ? "below 1" : "", all[0], all[1], {}, gain);
+  pair.ssim("8 spp, cuts: SSIM two levels - one", sparse ? "above 0" : "", all[0], all[1],
+            sparse ? std::optional<double>(0) : std::nullopt);
   pair.time("8 spp, cuts: time two levels / one", sparse ? value_text(18.7 / 17.4) : "", all[0], all[1], {},
             price);
   pair.mse("8 spp, from the root: MSE two levels / one", "", all[2], all[3], {}, {});

@@ -145,7 +145,7 @@ void report_presets(const Subject& subject, const Report& report) {
        1,
        fmt::format(
            "rtslc {:.0f} ms, variance {:.4g}; tree {:.0f} ms, variance {:.4g}; {}x{} pixels, jittered, {} light",
-           rtslc.ms(), a.value, tree.ms(), b.value, kImageWidth, kImageHeight,
+           rtslc.ms(), a.value, tree.ms(), b.value, kWindow[1] - kWindow[0], kWindow[3] - kWindow[2],
            subject.vpls ? "indirect" : "direct")});
 }
 
