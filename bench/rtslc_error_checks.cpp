@@ -9,7 +9,7 @@
 namespace lumigrove::bench {
 namespace {
 
-constexpr int kImages = 8;
+constexpr int kImages = 8, kEqualTimeImages = 6;
 constexpr int kSpp = 8;            // of table 3
 constexpr int kEqualTimeSpp = 16;  // of the perfect tree with cuts, where times are equal
 constexpr int kMostCutNodes = 32;
@@ -102,7 +102,7 @@ std::array<Rows, 2> measure_rows(const Subject& subject) {
     const double budget = reference.ms_median() * kEqualTimeSpp / kSpp;
     for (std::size_t i = 0; i < entries.size(); ++i)
       if (at_8[i].ok()) entries[i].spp = samples_in(budget, at_8[i]);
-    later = study.measure(entries, kImages);
+    later = study.measure(entries, kEqualTimeImages);
   }
   std::array<Rows, 2> rows;
   for (std::size_t v = 0; v < 2; ++v)
