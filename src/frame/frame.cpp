@@ -192,7 +192,7 @@ constexpr float kSubstituteOffset = 2.2e-3f;
 constexpr float kInsideDistance = 0.2155f;
 
 bool uses_bvh(const DirectSettings& s) {
-  return s.selection == Selection::kRoot &&
+  return (s.selection == Selection::kRoot || s.selection == Selection::kCut) &&
          (s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative);
 }
 
@@ -226,7 +226,10 @@ StructureStats build_alias_table(AliasTable& table, const char* name, std::size_
 
 // --- the world ---------------------------------------------------------------------------------------------
 
-std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats) {
+std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats,
+                                  History::Kept* kept) {
+  History::Kept known;
+  if (kept) known = take_kept(*kept, scene, settings);
   SceneState state = evaluate(scene, settings.time);
   SceneArrays arrays(scene);
   arrays.set_state(state);
@@ -234,13 +237,20 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   Tracer tracer(scene, state);
   stats.structures.push_back(
       {kAccelerationStructure, watch.ms(), tracer.bytes(), state.instances.size()});
-  LightSet lights(scene, arrays);
+  LightSet lights = known.lights ? std::move(*known.lights) : LightSet(scene, arrays);
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
-      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, {}, {}, std::move(camera), {}, {},
-      {}});
+      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, std::move(known.two_level), {}, {},
+      std::move(camera), known.texture_key, known.shape_key, {}, {}, {}});
   build_lights(*world, settings, stats);
   return world;
+}
+
+void keep(World&& world, History::Kept& kept) {
+  kept.texture_key = world.texture_key;
+  kept.shape_key = world.shape_key;
+  kept.lights.emplace(std::move(world.lights));
+  kept.two_level = std::move(world.two_level);
 }
 
 void build_lights(World& world, const Settings& settings, RenderStats& stats) {
@@ -335,6 +345,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   direct.sampler.tree = two_level ? world.two_level.top().view() : world.tree.view();
   if (two_level) direct.sampler.mesh_trees = world.two_level.view();
   direct.sampler.bvh = world.bvh.view();
+  const bool bvh = uses_bvh(settings.direct);
   switch (settings.direct.selection) {
     case Selection::kUniform:
       direct.sampler.choice = LightChoice::kUniform;
@@ -343,16 +354,16 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
       direct.sampler.choice = LightChoice::kPower;
       break;
     case Selection::kRoot:
-      direct.sampler.choice = uses_bvh(settings.direct) ? LightChoice::kBvh : LightChoice::kTree;
-      direct.use_split = uses_bvh(settings.direct) && settings.direct.split > 0;
+      direct.sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
+      direct.use_split = bvh && settings.direct.split > 0;
       direct.split = {settings.direct.split, settings.direct.split_cap};
       break;
     case Selection::kCut: {
-      direct.sampler.choice = LightChoice::kTree;
+      direct.sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
       direct.use_cuts = true;
       const float floor = settings.direct.cut_floor * direct.sampler.lights.bounds.diagonal();
-      direct.cut = {settings.direct.spp, std::max(floor * floor, direct.sampler.tree.inside2),
-                    settings.direct.cut_bound};
+      const float inside2 = bvh ? direct.sampler.bvh.inside2 : direct.sampler.tree.inside2;
+      direct.cut = {settings.direct.spp, std::max(floor * floor, inside2), settings.direct.cut_bound};
       direct.lookup.share = settings.direct.cut_share;
       direct.lookup.interleave = settings.direct.cut_interleave;
       direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
@@ -428,8 +439,8 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "film", sum.film_ms, 0);
 }
 
-Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
-             const ProgressFunction& progress) {
+Image render(const Scene& scene, const Settings& settings, RenderStats* stats, const ProgressFunction& progress,
+             History* history) {
   check(settings);
   RenderStats local;
   RenderStats& result = stats ? *stats : local;
@@ -440,7 +451,8 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
   tbb::task_arena arena(threads);
   return arena.execute([&] {
     const Stopwatch watch;
-    const std::unique_ptr<World> world = make_world(scene, settings, result);
+    History::Kept* const kept = history ? &history->kept() : nullptr;
+    const std::unique_ptr<World> world = make_world(scene, settings, result, kept);
     Film film(settings.width, settings.height,
               settings.indirect.show && settings.indirect.transport == Transport::kVpl);
     for (int sample = 0; sample < settings.spp; ++sample) {
@@ -449,6 +461,7 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
       result.spp_done = sample + 1;
       if (progress && !progress({result.spp_done, settings.spp, watch.ms() * 1e-3})) break;
     }
+    if (kept) keep(std::move(*world), *kept);
     result.total_ms = watch.ms();
     return develop(film, result.spp_done);
   });

@@ -431,16 +431,11 @@ void check_cuts(const DirectSettings& s) {
   if (s.selection != Selection::kCut) return;
   if (s.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'cut' cuts a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
-  if (s.hierarchy == Hierarchy::kTwoLevel)
-    throw Error("direct.selection 'cut' cuts one tree, but direct.hierarchy is 'two-level'; use 'perfect'");
   if (s.spp > kMaxCut)
     throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
 }
 
 void check_light_bvh(const DirectSettings& s) {
-  if (s.selection == Selection::kCut && s.hierarchy != Hierarchy::kPerfect)
-    throw Error("direct.selection 'cut' cuts the perfect tree only; set direct.hierarchy 'perfect' or direct.selection "
-                "'root'");
   if (s.selection != Selection::kRoot && s.selection != Selection::kCut) return;
   const bool bvh = s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative;
   if (s.weights == Weights::kSaoh && !bvh)
@@ -448,6 +443,8 @@ void check_light_bvh(const DirectSettings& s) {
                 "'yuksel'");
   if (s.split > 0 && !bvh)
     throw Error("direct.split needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 0");
+  if (s.split > 0 && s.selection == Selection::kCut)
+    throw Error("direct.split does not combine with cuts; set direct.split 0 or direct.selection 'root'");
 }
 
 void check_vpls(const IndirectSettings& s) {
