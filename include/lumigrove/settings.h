@@ -17,7 +17,7 @@ namespace lumigrove {
 // The axes of the space of methods (docs/papers.md); the table in registry.cpp holds their names.
 enum class Hierarchy : std::uint8_t { kNone, kPerfect, kTwoLevel, kSaoh, kAgglomerative };
 enum class Weights : std::uint8_t { kMinMax, kSaoh, kYuksel };
-enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut };
+enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut, kPool };
 enum class CutBound : std::uint8_t { kNearest, kExact, kChildren };
 enum class Transport : std::uint8_t { kNone, kPath, kVpl };
 enum class IndirectHierarchy : std::uint8_t { kNone, kSubstitute };
@@ -39,6 +39,8 @@ struct DirectSettings {
   int cut_interleave = 1;       // m: the pixels of m x m share out a cut's nodes
   float cut_floor = 0.001f;     // least distance in the bound, in units of the diagonal of the lights' box
   CutBound cut_bound = CutBound::kChildren;
+  // Pools (kPool): lights are drawn for every cut_share x cut_share pixels, each of which takes spp of them
+  int pool = 64;                // lights of a pool: 16, 32, 48, 64
   // Adaptive tree splitting (kSaoh, kAgglomerative)
   float split = 0;              // threshold: one sample below each part of a split tree; 0 = no splitting
   int split_cap = 16;           // most parts, at most 64

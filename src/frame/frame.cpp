@@ -66,6 +66,7 @@ void timed(double& ms, const Step& step) {
 DirectLighting away_from_camera(DirectLighting direct) {
   direct.spp = 1;
   direct.use_cuts = false;
+  direct.use_pools = false;
   direct.use_split = false;
   return direct;
 }
@@ -122,7 +123,7 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
   });
 
   DirectLighting of_tile = direct;
-  of_tile.lookup.window = tile;
+  of_tile.lookup.window = of_tile.pools.areas.window = tile;
   add_direct_light(of_tile, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, of_tile, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,
                  b.direct, b.indirect);
@@ -264,7 +265,8 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
     world.bvh.build(lights, {builder, settings.direct.weights, settings.direct.cones});
     stats.structures.push_back({builder == Hierarchy::kSaoh ? "SAOH tree" : "agglomerative tree", world.bvh.build_ms(),
                                 world.bvh.bytes(), world.bvh.view().count});
-  } else if (settings.direct.selection == Selection::kRoot || settings.direct.selection == Selection::kCut) {
+  } else if (settings.direct.selection == Selection::kRoot || settings.direct.selection == Selection::kCut ||
+             settings.direct.selection == Selection::kPool) {
     build_light_tree(world, settings.direct, stats);
   }
   if (settings.direct.selection == Selection::kPower) {
@@ -369,6 +371,14 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
       direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
       break;
     }
+    case Selection::kPool:
+      direct.sampler.choice = LightChoice::kTree;
+      direct.use_pools = true;
+      direct.pools.size = settings.direct.pool;
+      direct.pools.interleave = settings.direct.cut_interleave;
+      direct.pools.areas.share = settings.direct.cut_share * settings.direct.cut_interleave;
+      direct.pools.areas.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
+      break;
     case Selection::kAll:
       direct.all = true;
       break;
@@ -409,6 +419,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     sum.film_ms += b.film_ms;
     sum.primary_rays += b.primary_rays;
     sum.direct_buffers.cut_ms += b.direct_buffers.cut_ms;
+    sum.direct_buffers.pool_ms += b.direct_buffers.pool_ms;
     sum.direct_buffers.split_ms += b.direct_buffers.split_ms;
     sum.direct_buffers.select_ms += b.direct_buffers.select_ms;
     sum.direct_buffers.trace_ms += b.direct_buffers.trace_ms;
@@ -421,6 +432,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
   add_pass(stats, "surfaces", sum.surface_ms, 0);
   if (direct.use_split) add_pass(stats, "splitting", sum.direct_buffers.split_ms, 0);
+  if (direct.use_pools) add_pass(stats, "light pools", sum.direct_buffers.pool_ms, 0);
   if (direct.use_cuts) add_pass(stats, "cuts", sum.direct_buffers.cut_ms, 0);
   add_pass(stats, "light selection", sum.direct_buffers.select_ms, 0);
   add_pass(stats, "shadow rays", sum.direct_buffers.trace_ms, sum.direct_buffers.rays);

@@ -11,6 +11,7 @@
 #include "frame/value_text.h"
 #include "lumigrove/settings.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
+#include "methods/light_sampling/light_pool_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 
 namespace lumigrove {
@@ -220,9 +221,10 @@ std::vector<Setting> direct_rows() {
                                           {"power", Selection::kPower},
                                           {"root", Selection::kRoot},
                                           {"all", Selection::kAll},
-                                          {"cut", Selection::kCut}},
-          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, or walking it "
-          "from every node of a cut"),
+                                          {"cut", Selection::kCut},
+                                          {"pool", Selection::kPool}},
+          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, walking it "
+          "from every node of a cut, or among lights that were drawn for a block of pixels"),
       choice(
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
           vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
@@ -269,6 +271,10 @@ std::vector<Setting> direct_rows() {
                                          {"children", CutBound::kChildren}},
           "Error of a cut's node: by one box around its lights, with the cosine of the box's nearest point or an exact "
           "bound of it; or the sum over the boxes inside it"),
+      choice(
+          "direct.pool", [](auto& s) -> auto& { return s.direct.pool; },
+          vector<pair<string, int>>{{"16", 16}, {"32", 32}, {"48", 48}, {"64", 64}},
+          "Lights that are drawn for a block of cut_share x cut_share pixels; every pixel takes direct.spp of them"),
       real(
           "direct.split", [](auto& s) -> auto& { return s.direct.split; }, {0, 1}, "",
           "Threshold of adaptive tree splitting: a light sample below each part of the tree; larger = more parts, 0 = no "
@@ -435,6 +441,16 @@ void check_cuts(const DirectSettings& s) {
     throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
 }
 
+void check_pools(const DirectSettings& s) {
+  if (s.selection != Selection::kPool) return;
+  if (s.hierarchy != Hierarchy::kPerfect)
+    throw Error("direct.selection 'pool' draws its lights from the perfect tree only; set direct.hierarchy 'perfect'");
+  if (s.cut_interleave > kMaxPoolInterleave)
+    throw Error(fmt::format("direct.selection 'pool' interleaves at most {0} x {0} pixels, but direct.cut_interleave is {1}",
+                            kMaxPoolInterleave, s.cut_interleave));
+  if (s.mis) throw Error("direct.mis does not combine with pools; set direct.selection 'root' or 'cut', or direct.mis false");
+}
+
 void check_light_bvh(const DirectSettings& s) {
   if (s.selection != Selection::kRoot && s.selection != Selection::kCut) return;
   const bool bvh = s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative;
@@ -478,6 +494,18 @@ const std::vector<PresetInfo>& presets() {
         {"direct.weights", "min-max"},
         {"direct.spp", "8"},
         {"direct.cut_share", "8"},
+        {"indirect.transport", "none"}}},
+      {"pool",
+       "Lights drawn for every 8x8 pixels from the perfect light tree, 8 of them taken by each pixel by what they would send "
+       "unoccluded; direct light only",
+       "of this project, from D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts, 2020, and J. Talbot, D. Cline, P. Egbert: "
+       "Importance Resampling for Global Illumination. EGSR 2005",
+       {{"direct.selection", "pool"},
+        {"direct.hierarchy", "perfect"},
+        {"direct.weights", "min-max"},
+        {"direct.spp", "8"},
+        {"direct.cut_share", "8"},
+        {"direct.cut_interleave", "4"},
         {"indirect.transport", "none"}}},
       {"ats",
        "Adaptive tree splitting: a light BVH built by the surface-area-orientation heuristic, split near each surface, a "
@@ -582,6 +610,7 @@ void check(const Settings& s) {
   if (s.direct.selection == Selection::kRoot && s.direct.hierarchy == Hierarchy::kNone)
     throw Error("direct.selection 'root' walks a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
   check_cuts(s.direct);
+  check_pools(s.direct);
   check_light_bvh(s.direct);
   check_vpls(s.indirect);
 }

@@ -265,11 +265,8 @@ struct DirectLightKernel {
   }
 
   LUMI_HD LUMI_ALWAYS_INLINE void write(std::size_t i, const LightSample& sample, float weight) const {
-    if (!(max_component(sample.weight) > 0)) return;
     const Surface& surface = surfaces[i];
-    const float cosine = glm::dot(surface.normal, sample.wi);
-    if (!(cosine > 0)) return;
-    vec3 light = bsdf_eval(surface, sample.wi) * sample.weight * (cosine * weight);
+    vec3 light = unoccluded_light(surface, sample) * weight;
     // Balance heuristic of n = 1 / weight light samples and one BSDF sample.
     if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + weight * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;

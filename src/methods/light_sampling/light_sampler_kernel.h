@@ -21,6 +21,7 @@
 #include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "methods/light_tree/two_level_tree_kernel.h"
+#include "scene/bsdf.h"
 #include "scene/surface.h"
 #include "trace/ray.h"
 
@@ -318,6 +319,13 @@ LUMI_HD inline float pdf_environment_beside_local(const LightSampler& sampler, c
   if (!(p.environment > 0)) return 0;
   const float directional_share = p.directional / (p.directional + p.environment);
   return (1 - directional_share) * pdf_environment(sampler.lights.environment, surface.normal, wi);
+}
+
+// Radiance that a light sample sends towards wo if nothing is in between.
+LUMI_HD LUMI_ALWAYS_INLINE vec3 unoccluded_light(const Surface& surface, const LightSample& sample) {
+  if (!(max_component(sample.weight) > 0)) return vec3(0);
+  const float cosine = glm::dot(surface.normal, sample.wi);
+  return cosine > 0 ? bsdf_eval(surface, sample.wi) * sample.weight * cosine : vec3(0);
 }
 
 // Segment from the surface to the light sample; it stops short of the light by the same relative margin
