@@ -72,6 +72,7 @@ const std::vector<Benchmark>& benchmarks() {
 const std::vector<Reproduction>& reproductions() {
   static const std::vector<Reproduction> table = {
       {"sst", "W. Tatzgern et al., Stochastic Substitute Trees for Real-Time Global Illumination, I3D 2020", sst_checks()},
+      {"rtslc", "D. Lin, C. Yuksel, Real-Time Stochastic Lightcuts, I3D 2020", rtslc_checks()},
   };
   return table;
 }
