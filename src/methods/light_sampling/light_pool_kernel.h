@@ -152,10 +152,10 @@ LUMI_HD inline PoolLight triangle_pool_light(const SceneView& scene, const Light
 }
 
 // What a walk chose, as one of `draws` lights of a pool; dark where it chose none.
-LUMI_HD inline PoolLight make_pool_light(const LightSampler& sampler, TreeSample chosen, vec2 u, int draws) {
+LUMI_HD inline PoolLight make_pool_light(const LightSampler& sampler, TreeSample chosen, vec2 u) {
   PoolLight light{};
   if (chosen.pdf > 0) {
-    const float weight = 1 / (chosen.pdf * static_cast<float>(draws));
+    const float weight = 1 / chosen.pdf;
     const Emitter& e = sampler.lights.emitters[chosen.emitter];
     light = e.punctual() ? punctual_pool_light(sampler.lights, e, weight)
                          : triangle_pool_light(sampler.scene, sampler.lights, chosen.emitter, u, weight);
@@ -164,7 +164,52 @@ LUMI_HD inline PoolLight make_pool_light(const LightSampler& sampler, TreeSample
   return light;
 }
 
-// The pools of an area share out lights that are drawn together, each from a stratum of its own.
+// What select_cut asks of the perfect tree, for a region. A node's error is the sum over its children of the most that each
+// can send to a point of the region, at least the region's size away.
+template <int W>
+struct CutOfRegion {
+  const LightTreeView& tree;
+  const WalkRegion& region;
+  float floor2;
+
+  LUMI_HD TreeStart enter(Subtree s) const {
+    if (s.children > 1 || is_leaf(tree, s)) return {s};
+    return {{s.node * W + s.first, static_cast<std::int16_t>(s.level + 1), 0, static_cast<std::uint8_t>(W)}};
+  }
+  LUMI_HD bool root(TreeStart& start) const {
+    start = enter(binary_root(tree));
+    return tree.count > 0;
+  }
+  LUMI_HD int split(const TreeStart& start, TreeStart (&parts)[2]) const {
+    const Subtree& s = start.subtree;
+    const auto half = static_cast<std::uint8_t>(s.children / 2);
+    int count = 0;
+    for (int side = 0; side < 2; ++side) {
+      const Subtree part{s.node, s.level, static_cast<std::uint8_t>(s.first + side * half), half};
+      if (bounds_of<W>(tree.level<W>(s.level)[s.node], part.first, half).intensity > 0) parts[count++] = enter(part);
+    }
+    return count;
+  }
+  LUMI_HD float error(const TreeStart& start) const {
+    const Subtree& s = start.subtree;
+    if (is_leaf(tree, s)) return 0;
+    Weighing weighing = weighing_of_level(tree, s.level, Weights::kMinMax);
+    weighing.inside2 = floor2;
+    alignas(64) float errors[W];
+    store_lanes<W>(bound_children_of_region<W>(tree.level<W>(s.level)[s.node], weighing, region), errors);
+    float sum = 0;
+    for (int c = s.first; c < s.first + s.children; ++c) sum += errors[c];
+    return sum;
+  }
+};
+
+struct AreaCut {
+  TreeStart nodes[kMaxPool];
+  float error[kMaxPool];
+  int count = 0;
+};
+
+// A light below each node of the area's cut for every pool.
 struct PoolKernel {
   LightSampler sampler;
   PoolLookup lookup;
@@ -179,7 +224,7 @@ struct PoolKernel {
     draw(area, count, chosen, u[0], u[1]);
     for (int j = 0; j < count; ++j)
       pools[static_cast<std::size_t>(area * many + j % many)].set(
-          j / many, make_pool_light(sampler, chosen[j], vec2(u[0][j], u[1][j]), lookup.size));
+          j / many, make_pool_light(sampler, chosen[j], vec2(u[0][j], u[1][j])));
   }
 
  private:
@@ -187,25 +232,35 @@ struct PoolKernel {
     const PixelWindow pixels = lookup.areas.pixels_of(area);
     const AreaBounds bounds = bounds_of_area(lookup.areas, pixels, surfaces);
     const LightTreeView& tree = sampler.tree;
-    if (!bounds.present || tree.count == 0) {
-      for (int j = 0; j < count; ++j) chosen[j] = {};
-      return;
-    }
+    for (int j = 0; j < count; ++j) chosen[j] = {};
+    if (!bounds.present || tree.count == 0) return;
+    const WalkRegion region{bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
+    AreaCut cut;
+    with_width(tree.width, [&](auto w) {
+      const float floor2 = glm::max(tree.inside2, length_squared(region.half));
+      select_cut(CutOfRegion<w>{tree, region, floor2}, lookup.size, cut);
+    });
+    const int many = lookup.pools_per_area();
+    SortedStart starts[kMaxPool];
+    for (int k = 0; k < cut.count; ++k)
+      starts[k] = {cut.nodes[k].subtree, static_cast<std::uint32_t>(k * many), static_cast<std::uint32_t>((k + 1) * many)};
+
     const auto corner = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
     const Rng numbers{rng.seed, rng.frame, corner};
     float r[kMaxDraws], fresh[kMaxDraws];
-    const float inverse_count = 1 / static_cast<float>(count);
+    const float inverse_many = 1 / static_cast<float>(many);
+    count = cut.count * many;
     for (int j = 0; j < count; ++j) {
       const vec4 w = numbers.uniform4(kDimPool + 4 * static_cast<std::uint32_t>(j));
-      r[j] = glm::min((static_cast<float>(j) + w.x) * inverse_count, 0x1.fffffep-1f);
+      r[j] = glm::min((static_cast<float>(j % many) + w.x) * inverse_many, 0x1.fffffep-1f);
       u[j] = w.y;
       v[j] = w.z;
       fresh[j] = w.w;
     }
-    const WalkRegion region{bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
     WalkRange ranges[kMaxDraws], next[kMaxDraws];
     const auto n = static_cast<std::size_t>(count);
-    sample_light_tree_sorted(tree, region, {{r, n}, {fresh, n}, {ranges, n}, {next, n}}, {chosen, n});
+    sample_light_tree_sorted(tree, region, {starts, static_cast<std::size_t>(cut.count)},
+                             {{r, n}, {fresh, n}, {ranges, n}, {next, n}}, {chosen, n});
     for (int j = 0; j < count; ++j)
       if (chosen[j].pdf > 0) prefetch(&sampler.lights.emitters[chosen[j].emitter]);
   }

@@ -16,15 +16,28 @@ struct WalkRegion {
   float spread = 0;
 };
 
-// Weights for a region: every one that is positive for a point of it is positive. No point is nearer to a box, nor the box
+// Weights of children first, ..., first + children - 1 for a region: every one that is positive for a point of it is positive. No point is nearer to a box, nor the box
 // higher above its horizon, than the centre is to the box enlarged by the region, with a margin for the normals.
 template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children_of_region(const LightNode<W>& node, Weighing weighing,
-                                                                    const WalkRegion& region) {
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children_of_region(const LightNode<W>& node, int first, int children,
+                                                                    Weighing weighing, const WalkRegion& region) {
   BoxLanes<W> boxes = load_boxes<W>(node);
+  if (children < W) boxes.intensity = boxes.intensity * lanes_in_range<W>(first, children);
   boxes.half = {boxes.half.x + region.half.x, boxes.half.y + region.half.y, boxes.half.z + region.half.z};
   weighing.horizon_margin += region.spread;
   return weigh_children<W>(boxes, node, weighing, region.centre, region.normal);
+}
+
+// Most that each child can send to a point of the region.
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE Lanes<W> bound_children_of_region(const LightNode<W>& node, const Weighing& weighing,
+                                                             const WalkRegion& region) {
+  BoxLanes<W> boxes = load_boxes<W>(node);
+  boxes.half = {boxes.half.x + region.half.x, boxes.half.y + region.half.y, boxes.half.z + region.half.z};
+  return weigh_boxes<W>(
+             boxes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.inside2, broadcast<W>(region.centre),
+             broadcast<W>(region.normal), Weights::kMinMax, weighing.horizon_margin + region.spread)
+      .near;
 }
 
 // Walks first, ..., end - 1 of a sorted set, which have come the same way.
@@ -42,49 +55,74 @@ struct SortedWalks {
   std::span<WalkRange> ranges, next;
 };
 
-// samples[i]: of the walk with number r[i]; kNoEmitter and 0 on a dead branch.
+// Walks first, ..., end - 1 start here.
+struct SortedStart {
+  Subtree subtree;
+  std::uint32_t first, end;
+};
+
+// Sorted walks on their way down.
+template <int W>
+struct SortedWalk {
+  const LightTreeView& tree;
+  const WalkRegion& region;
+  const SortedWalks& walks;
+  std::span<TreeSample> samples;
+  Weighing weighing;
+  int level = 0;
+
+  // One step of the walks of a range, from all children of its node or those of `start`. Those that go on are appended to
+  // `next`; returns how many ranges it then has.
+  LUMI_HD LUMI_ALWAYS_INLINE int step(const WalkRange& range, const Subtree* start, WalkRange* next, int kept) const {
+    const LightNode<W>& node = tree.level<W>(level)[range.node];
+    const ChildWeights<W> children = start ? weigh_children_of_region<W>(node, start->first, start->children, weighing, region)
+                                           : weigh_children_of_region<W>(node, 0, W, weighing, region);
+    const std::uint32_t positive = greater_bits<W>(children.weight, broadcast<W>(0));
+    const bool last = level + 1 == tree.levels;
+    float* const r = walks.r.data();
+    if (!(children.total > 0) || positive == 0) {
+      for (std::uint32_t i = range.first; i < range.end; ++i) samples[i] = {};
+      return kept;
+    }
+    if (level == (tree.levels + 1) / 2 && range.end == range.first + 1) r[range.first] = walks.fresh[range.first];
+    alignas(64) float weights[W], sums[W];
+    store_lanes<W>(children.weight, weights);
+    store_lanes<W>(children.cumulative, sums);
+    for (std::uint32_t i = range.first; i < range.end;) {
+      const std::uint32_t beyond = greater_bits<W>(children.cumulative, broadcast<W>(r[i] * children.total)) & positive;
+      const int lane = beyond != 0 ? lowest_bit(beyond) : highest_bit(positive);
+      const float before = sums[lane] - weights[lane], inverse = 1 / weights[lane];
+      const float end = beyond != 0 ? sums[lane] : kInfinity;
+      WalkRange child{range.node * W + static_cast<std::uint32_t>(lane), range.pdf * (weights[lane] / children.total), i,
+                      i};
+      for (; i < range.end && r[i] * children.total < end; ++i) {
+        r[i] = glm::min(glm::max((r[i] * children.total - before) * inverse, 0.0f), 0x1.fffffep-1f);
+        if (last) samples[i] = {tree.leaf_emitters[child.node], child.pdf};
+      }
+      if (last) continue;
+      child.end = i;
+      next[kept++] = child;
+      prefetch_step<W>(tree, level + 1, child.node);
+    }
+    return kept;
+  }
+};
+
+// samples[i]: of the walk with number r[i]; kNoEmitter and 0 on a dead branch. The numbers ascend within a start.
 template <int W, Weights kWeights>
 LUMI_HD inline void walk_light_tree_sorted(const LightTreeView& tree, const WalkRegion& region,
-                                           const SortedWalks& walks, std::span<TreeSample> samples) {
+                                           std::span<const SortedStart> starts, const SortedWalks& walks,
+                                           std::span<TreeSample> samples) {
   WalkRange *ranges = walks.ranges.data(), *next = walks.next.data();
-  float* const r = walks.r.data();
-  int living = 1;
-  ranges[0] = {0, 1, 0, static_cast<std::uint32_t>(samples.size())};
+  SortedWalk<W> walk{tree, region, walks, samples, {}, 0};
+  int living = 0;
   for (int level = 0; level < tree.levels; ++level) {
-    const LightNode<W>* nodes = tree.level<W>(level);
-    const Weighing weighing = weighing_of_level(tree, level, kWeights);
-    const bool second_number = level == (tree.levels + 1) / 2, last = level + 1 == tree.levels;
+    walk.level = level;
+    walk.weighing = weighing_of_level(tree, level, kWeights);
     int kept = 0;
-    for (int k = 0; k < living; ++k) {
-      const WalkRange range = ranges[k];
-      const ChildWeights<W> children = weigh_children_of_region<W>(nodes[range.node], weighing, region);
-      const std::uint32_t positive = greater_bits<W>(children.weight, broadcast<W>(0));
-      if (!(children.total > 0) || positive == 0) {
-        for (std::uint32_t i = range.first; i < range.end; ++i) samples[i] = {};
-        continue;
-      }
-      if (second_number && range.end == range.first + 1) r[range.first] = walks.fresh[range.first];
-      alignas(64) float weights[W], sums[W];
-      store_lanes<W>(children.weight, weights);
-      store_lanes<W>(children.cumulative, sums);
-      for (std::uint32_t i = range.first; i < range.end;) {
-        const std::uint32_t beyond =
-            greater_bits<W>(children.cumulative, broadcast<W>(r[i] * children.total)) & positive;
-        const int lane = beyond != 0 ? lowest_bit(beyond) : highest_bit(positive);
-        const float before = sums[lane] - weights[lane], inverse = 1 / weights[lane];
-        const float end = beyond != 0 ? sums[lane] : kInfinity;
-        WalkRange child{range.node * W + static_cast<std::uint32_t>(lane), range.pdf * (weights[lane] / children.total),
-                        i, i};
-        for (; i < range.end && r[i] * children.total < end; ++i) {
-          r[i] = glm::min(glm::max((r[i] * children.total - before) * inverse, 0.0f), 0x1.fffffep-1f);
-          if (last) samples[i] = {tree.leaf_emitters[child.node], child.pdf};
-        }
-        if (last) continue;
-        child.end = i;
-        next[kept++] = child;
-        prefetch_step<W>(tree, level + 1, child.node);
-      }
-    }
+    for (int k = 0; k < living; ++k) kept = walk.step(ranges[k], nullptr, next, kept);
+    for (const SortedStart& s : starts)
+      if (s.subtree.level == level) kept = walk.step({s.subtree.node, 1, s.first, s.end}, &s.subtree, next, kept);
     WalkRange* const done = ranges;
     ranges = next;
     next = done;
@@ -92,12 +130,13 @@ LUMI_HD inline void walk_light_tree_sorted(const LightTreeView& tree, const Walk
   }
 }
 
-// As many walks as samples. tree.count > 0.
+// tree.count > 0.
 LUMI_HD inline void sample_light_tree_sorted(const LightTreeView& tree, const WalkRegion& region,
-                                             const SortedWalks& walks, std::span<TreeSample> samples) {
+                                             std::span<const SortedStart> starts, const SortedWalks& walks,
+                                             std::span<TreeSample> samples) {
   with_width(tree.width, [&](auto width) {
     with_weights(tree.weights,
-                 [&](auto weights) { walk_light_tree_sorted<width, weights>(tree, region, walks, samples); });
+                 [&](auto weights) { walk_light_tree_sorted<width, weights>(tree, region, starts, walks, samples); });
   });
 }
 

@@ -266,9 +266,9 @@ struct CutOfBvh {
 
 // --- selection ---------------------------------------------------------------------------------------------
 
-// Splits the node of the greatest error until there are n, or none has any.
-template <class Tree>
-LUMI_HD inline void select_cut(const Tree& tree, int size, LightCut& cut) {
+// Splits the node of the greatest error until there are n, or none has any. Cut: LightCut, or longer.
+template <class Tree, class Cut>
+LUMI_HD inline void select_cut(const Tree& tree, int size, Cut& cut) {
   cut.count = 0;
   if (!tree.root(cut.nodes[0])) return;
   cut.error[0] = tree.error(cut.nodes[0]);
