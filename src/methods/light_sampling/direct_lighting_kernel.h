@@ -49,6 +49,7 @@ struct DirectLightKernel {
   CutSamples cuts = {};     // none: walks start at the root
   Stratum stratum = {};
   SplitSamples split = {};  // kBvh; none: walks start at the root
+  std::span<std::uint8_t> from_vpl = {};  // is the light of surfaces[i] a virtual point light's? Empty: not wanted
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
@@ -79,6 +80,7 @@ struct DirectLightKernel {
   LUMI_HD bool lights_up(std::size_t i) const {
     shadow[i].tmax = -1;
     contribution[i] = vec3(0);
+    if (!from_vpl.empty()) from_vpl[i] = 0;
     return surfaces[i].instance != kNoId;
   }
 
@@ -203,7 +205,7 @@ struct DirectLightKernel {
                             vec2 u, float weight) const {
     if (mis || !(chosen.pdf > 0)) return false;
     const Emitter& e = sampler.lights.emitters[chosen.emitter];
-    if (e.punctual()) return false;
+    if (!e.triangle()) return false;
     const EmissiveInstance& instance = sampler.lights.instances[e.source];
     if (instance.textured || instance.masked) return false;
     triangles.add(i, surfaces[i], e, instance, u, weight / (chosen.pdf * group.probability));
@@ -237,10 +239,11 @@ struct DirectLightKernel {
     const Surface& surface = surfaces[i];
     const float cosine = glm::dot(surface.normal, sample.wi);
     if (!(cosine > 0)) return;
-    vec3 light = bsdf_eval(surface, sample.wi) * sample.weight * (cosine * weight);
+    vec3 light = bsdf_of_sample(sampler, surface, sample) * sample.weight * (cosine * weight);
     // Balance heuristic of n = 1 / scale light samples and one BSDF sample.
     if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + scale * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;
+    if (!from_vpl.empty()) from_vpl[i] = sample.from_vpl ? 1 : 0;
     contribution[i] = light;
     shadow[i] = shadow_ray(surface, sample, sampler.lights.diagonal);
   }

@@ -21,6 +21,7 @@
 #include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "methods/light_tree/two_level_tree_kernel.h"
+#include "scene/bsdf.h"
 #include "scene/surface.h"
 #include "trace/ray.h"
 
@@ -33,6 +34,8 @@ struct LightSample {
   vec3 weight = vec3(0);               // radiance / pdf, or irradiance / selection probability without area
   std::uint32_t emitter = kNoEmitter;  // local emitter, kNoEmitter for lights at infinity
   float distance = 0;                  // metres; infinite for lights at infinity
+  bool from_vpl = false;               // the emitter is a virtual point light,
+  vec3 clear = vec3(0);                // where shadow rays to it end, clear of its own surface
 };
 
 enum class LightChoice : std::uint8_t { kUniform, kPower, kTree, kOne, kBvh };
@@ -46,6 +49,9 @@ struct LightSampler {
   LightBvhView bvh;       // kBvh
   std::uint32_t one = 0;  // kOne: emitters, then directional lights, then the environment
   MeshTreesView mesh_trees = {};  // kTree: where present, `tree` is the top level over these
+  // Virtual point lights among the emitters light gloss lobes too, but not of surfaces at most this rough.
+  bool vpl_gloss = true;
+  float vpl_mirror_roughness = 0;
 };
 
 struct GroupProbabilities {
@@ -168,8 +174,10 @@ LUMI_HD LUMI_ALWAYS_INLINE LightSample local_sample(const LightSampler& sampler,
   sample.distance = point.distance;
   sample.emitter = chosen.emitter;
   const Emitter& emitter = sampler.lights.emitters[chosen.emitter];
-  if (emitter.punctual()) {
+  if (!emitter.triangle()) {
     sample.weight = point.incident / chosen.pdf;
+    sample.from_vpl = emitter.vpl();
+    sample.clear = point.clear;
   } else {
     sample.pdf = chosen.pdf * point.area_to_solid / triangle_area(emitter);
     sample.weight = point.incident / sample.pdf;
@@ -285,6 +293,13 @@ LUMI_HD inline LightSample sample_light(const LightSampler& sampler, const Surfa
   return light_in_group(sampler, surface, group, chosen, u_point);
 }
 
+// f(wi, wo) of a sample, 1/sr.
+LUMI_HD inline vec3 bsdf_of_sample(const LightSampler& sampler, const Surface& surface, const LightSample& sample) {
+  const bool diffuse_only =
+      sample.from_vpl && !vpls_light_gloss(sampler.vpl_gloss, sampler.vpl_mirror_roughness, surface);
+  return diffuse_only ? bsdf_eval_diffuse(surface, sample.wi) : bsdf_eval(surface, sample.wi);
+}
+
 // Density per solid angle with which sample_light finds point `y` of `emitter` from `surface`.
 LUMI_HD inline float pdf_light(const LightSampler& sampler, const Surface& surface, std::uint32_t emitter,
                                vec3 y) {
@@ -309,6 +324,11 @@ LUMI_HD inline Ray shadow_ray(const Surface& surface, const LightSample& sample,
   ray.tmin = 0;
   if (sample.distance == kInfinity) {
     ray.direction = sample.wi * (2 * diagonal);
+    ray.tmax = 1;
+    return ray;
+  }
+  if (sample.from_vpl) {
+    ray.direction = sample.clear - ray.origin;
     ray.tmax = 1;
     return ray;
   }
