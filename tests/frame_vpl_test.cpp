@@ -217,8 +217,7 @@ TEST(FrameVpl, ShowAddsALayerOfTheWalks) {
 }
 
 TEST(FrameVpl, ScalingTheSceneChangesNoPixel) {
-  for (const Weights weight :
-       {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel}) {
+  for (const Weights weight : {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel}) {
     for (const bool leaf : {false, true}) {
       SCOPED_TRACE(std::to_string(static_cast<int>(weight)) + (leaf ? ", leaf" : ", substitute"));
       const auto render_scaled = [&](float factor) {

@@ -173,8 +173,7 @@ TEST(IndirectLighting, MeanOfWalksToLeavesIsTheSumOfAll) {
     const std::vector<vec3> truth = sum_of_all(room, surfaces, gloss);
     for (const Topology topology : {Topology::kRadix, Topology::kPerfect}) {
       room.build(topology);
-      for (const Weights weight :
-           {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel}) {
+      for (const Weights weight : {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel}) {
         IndirectLighting lighting = room.lighting(Selection::kRoot);
         lighting.sampler.gloss = gloss;
         lighting.sampler.walk.weight = weight;

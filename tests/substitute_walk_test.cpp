@@ -22,15 +22,14 @@ struct Config {
 };
 
 std::string name_of(const Config& c) {
-  static constexpr const char* kWeights[] = {"distance-bounded", "in-box", "yuksel"};
-  return std::string(c.topology == Topology::kRadix ? "radix, " : "perfect, ") + kWeights[static_cast<int>(c.weight)] +
+  const char* weight = c.weight == Weights::kYuksel ? "yuksel" : c.weight == Weights::kInBox ? "in-box" : "distance-bounded";
+  return std::string(c.topology == Topology::kRadix ? "radix, " : "perfect, ") + weight +
          (c.cones ? ", cones" : "") + (c.gloss ? ", gloss" : "") + (c.substitutes ? ", substitutes" : "");
 }
 
 std::vector<Config> configs(Topology topology, bool substitutes = false) {
   std::vector<Config> all;
-  for (const Weights weight :
-       {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel})
+  for (const Weights weight : {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel})
     for (const bool cones : {false, true})
       for (const bool gloss : {false, true})
         if (!(gloss && substitutes)) all.push_back({topology, weight, cones, gloss, substitutes});
