@@ -19,7 +19,7 @@ namespace {
 
 using namespace lumigrove::testing;
 
-constexpr float kClamp = 2;  // 1/m^2; reached by lights nearer than 0.7 m
+constexpr float kClamp = 0.2f;  // 1/m^2; reached by lights nearer than 2.2 m
 
 // A set of lights, and all that chooses among them.
 class VplLights {
