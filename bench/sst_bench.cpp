@@ -281,7 +281,7 @@ Result sst_steps(const Options&) {
                    slc = sized(slc_settings(true), kErrorWidth, kErrorHeight);
     Study study(scene, sst);
     study.trace(sst);
-    const SeenSurfaces seen(*study.world, sst);
+    const SeenImage seen(*study.world, sst);
     const double a = mean_steps(trace_walks(make_indirect_lighting(*study.world, sst, 0), seen));
     const double b = mean_steps(trace_walks(make_indirect_lighting(*study.world, slc, 0), seen));
     result.value = std::max(result.value, a / b);

@@ -226,7 +226,7 @@ void report_steps(const char* scene, const Report& report) {
   const Settings settings = sized(sst_settings(true), kErrorWidth, kErrorHeight);
   Study study(scene, settings);
   study.trace(settings);
-  const SeenSurfaces seen(*study.world, settings);
+  const SeenImage seen(*study.world, settings);
   const auto walks = [&](const Settings& method) {
     return trace_walks(make_indirect_lighting(*study.world, method, 0), seen);
   };

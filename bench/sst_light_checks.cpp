@@ -27,7 +27,7 @@ double mean_luminance(const std::vector<vec3>& light) {
 }
 
 // Means of luminance in kBlocks x kBlocks parts of the image.
-std::vector<double> block_means(const std::vector<vec3>& light, const SeenSurfaces& seen) {
+std::vector<double> block_means(const std::vector<vec3>& light, const SeenImage& seen) {
   std::vector<double> sums(kBlocks * kBlocks);
   for (std::size_t i = 0; i < light.size(); ++i) {
     const auto number = static_cast<int>(seen.pixels[i]);
@@ -51,7 +51,7 @@ Estimate mean_of(const std::vector<double>& values) {
   return mean.estimate();
 }
 
-Sampled sample_many(const Study& study, Settings settings, const SeenSurfaces& seen) {
+Sampled sample_many(const Study& study, Settings settings, const SeenImage& seen) {
   settings.indirect.spp = kBatchSpp;
   Sampled sampled;
   sampled.blocks.resize(kBlocks * kBlocks);
@@ -198,7 +198,7 @@ class SelectionCheck {
   const Report& report_;
   Settings settings_;
   Study study_;
-  SeenSurfaces seen_;
+  SeenImage seen_;
   std::vector<vec3> exact_;
   Sampled leaves_;
 };
@@ -211,7 +211,7 @@ void report_default_bias(const char* scene, const Report& report) {
   Settings leaves = settings;
   leaves.indirect.stop = Stop::kLeaf;
   Study study(scene, settings);
-  const SeenSurfaces seen(*study.world, settings);
+  const SeenImage seen(*study.world, settings);
   std::vector<vec3> bias[2];
   for (auto& half : bias) half.assign(seen.surfaces.size(), vec3(0));
   std::vector<double> differences, exact;
@@ -347,7 +347,7 @@ void report_depth(int check, const std::string& scene_name, const std::string& s
 // --- 9: weights ------------------------------------------------------------------------------------------------
 
 // Mean variance of a sample of one of the VPLs (leaves only) at the surfaces seen, one value a set of VPLs.
-std::vector<double> variances(Study& study, const SeenSurfaces& seen, Settings settings, Weights weights) {
+std::vector<double> variances(Study& study, const SeenImage& seen, Settings settings, Weights weights) {
   constexpr int kSets = 8, kSamples = 48;
   settings.indirect.stop = Stop::kLeaf;
   settings.indirect.weights = weights;
@@ -420,7 +420,7 @@ void check_weights(const Report& report) {
   const Settings settings = sized(sst_settings(true), kSurfacesWidth, kSurfacesHeight);
   for (const char* scene : kStudyScenes) {
     Study study(scene, settings);
-    const SeenSurfaces seen(*study.world, settings);
+    const SeenImage seen(*study.world, settings);
     const std::vector<double> bounded = variances(study, seen, settings, Weights::kDistanceBounded);
     const Estimate in_box = ratio_of_means(variances(study, seen, settings, Weights::kInBox), bounded);
     const Estimate yuksel = ratio_of_means(variances(study, seen, settings, Weights::kYuksel), bounded);

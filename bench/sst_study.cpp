@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "device/device.h"
-#include "scene/surface_kernel.h"
 
 namespace lumigrove::bench {
 namespace {
@@ -175,20 +174,6 @@ double squared_indirect_error(const Reference& reference, const RgbImage& indire
 }
 
 // --- light at fixed surfaces -----------------------------------------------------------------------------------
-
-SeenSurfaces::SeenSurfaces(const World& world, const Settings& settings)
-    : width(settings.width), height(settings.height) {
-  const PixelWindow window{0, 0, width, height};
-  const auto n = static_cast<std::size_t>(window.count());
-  std::vector<Ray> rays(n);
-  std::vector<Hit> hits(n);
-  surfaces.resize(n);
-  pixels.resize(n);
-  launch(window.count(),
-         CameraKernel{make_camera_view(world.camera, width, height), window, rays, pixels, 0, 0, false});
-  world.tracer.closest(rays, hits, Coherence::kCoherent);
-  launch(window.count(), SurfaceKernel{world.arrays.view(), rays, hits, surfaces, settings.force_diffuse});
-}
 
 std::vector<vec3> light_surfaces(const IndirectLighting& lighting, const SeenSurfaces& seen) {
   std::vector<vec3> light(seen.surfaces.size(), vec3(0));

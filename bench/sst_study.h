@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "frame/explain.h"
 #include "frame/frame.h"
 #include "metrics/metrics.h"
 
@@ -112,12 +113,13 @@ double squared_indirect_error(const Reference& reference, const RgbImage& indire
 // --- light at fixed surfaces -----------------------------------------------------------------------------------
 
 // What a camera sees through the centres of its pixels.
-struct SeenSurfaces {
-  std::vector<Surface> surfaces;
-  std::vector<std::uint32_t> pixels;  // keys of random numbers: row by row
+struct SeenImage : SeenSurfaces {
   int width, height;
 
-  SeenSurfaces(const World& world, const Settings& settings);
+  SeenImage(const World& world, const Settings& settings)
+      : SeenSurfaces(see_surfaces(world, settings, {0, 0, settings.width, settings.height}, false)),
+        width(settings.width),
+        height(settings.height) {}
 };
 
 // Light of the virtual point lights at every surface, of which samples of the settings' indirect.spp are averaged.

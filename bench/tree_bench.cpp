@@ -50,10 +50,9 @@ Result sample_scaling(const Options& options) {
   SurfaceBatch many("fireflies?n=1000000"), few("fireflies?n=10000");
   const PairTimes times = time_in_turns(
       options.runs, [&] { many.sample(); }, [&] { few.sample(); });
-  const double many_ns = times.a_ms * 1e6 / static_cast<double>(many.surfaces.size());
-  const double few_ns = times.b_ms * 1e6 / static_cast<double>(few.surfaces.size());
-  const double per_surface =
-      static_cast<double>(few.surfaces.size()) / static_cast<double>(many.surfaces.size());
+  const double many_ns = times.a_ms * 1e6 / static_cast<double>(many.size());
+  const double few_ns = times.b_ms * 1e6 / static_cast<double>(few.size());
+  const double per_surface = static_cast<double>(few.size()) / static_cast<double>(many.size());
   return {times.ratio * per_surface,
           {{"ns per sample, 1 M emitters, all threads", many_ns},
            {"ns per sample, 10 k emitters, all threads", few_ns},

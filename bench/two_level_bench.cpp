@@ -4,11 +4,19 @@
 #include "surface_batch.h"
 
 namespace lumigrove::bench {
+namespace {
+
+Settings two_level_settings() {
+  Settings settings = make_preset("tree");
+  settings.direct.hierarchy = Hierarchy::kTwoLevel;
+  return settings;
+}
+
+}  // namespace
 
 Result build_two_level(const Options& options) {
   const Scene scene = load_scene("night-city");
-  Settings settings = make_preset("tree");
-  settings.direct.hierarchy = Hierarchy::kTwoLevel;
+  const Settings settings = two_level_settings();
   RenderStats stats;
   const std::unique_ptr<World> world = make_world(scene, settings, stats);
   const SceneView view = world->arrays.view();
@@ -34,10 +42,10 @@ Result build_two_level(const Options& options) {
 namespace {
 
 Result sample_two_level(const Options& options, const std::string& scene) {
-  SurfaceBatch one_level(scene), two_level(scene, Hierarchy::kTwoLevel);
+  SurfaceBatch one_level(scene), two_level(scene, two_level_settings());
   const PairTimes times = time_in_turns(
       options.runs, [&] { two_level.sample(); }, [&] { one_level.sample(); });
-  const double samples = static_cast<double>(one_level.surfaces.size());
+  const double samples = static_cast<double>(one_level.size());
   return {times.ratio,
           {{"ns per sample, two levels, all threads", times.a_ms * 1e6 / samples},
            {"ns per sample, one level, all threads", times.b_ms * 1e6 / samples},

@@ -16,56 +16,15 @@
 
 #include "frame/receipt.h"
 #include "lumigrove/image.h"
-#include "tool.h"
+#include "tool_runner.h"
 
 namespace lumigrove {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Outcome {
-  int status = -1;  // exit status
-  std::string out, err;
-};
-
-std::string contents(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
-
-// Every test works in an empty folder of its own.
-class Cli : public ::testing::Test {
+class Cli : public ToolTest {
  protected:
-  void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) /
-              fmt::format("lumigrove-{}-{}", ::testing::UnitTest::GetInstance()->current_test_info()->name(),
-                          getpid());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  // Runs the tool in the folder, inside this process: starting one loads some 250 libraries.
-  Outcome run(const std::vector<std::string>& arguments) {
-    std::vector<std::string> words{"lumigrove"};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> pointers;
-    for (std::string& word : words) pointers.push_back(word.data());
-    const fs::path before = fs::current_path();
-    fs::current_path(folder_);
-    ::testing::internal::CaptureStdout();
-    ::testing::internal::CaptureStderr();
-    Outcome outcome;
-    outcome.status = run_tool(static_cast<int>(words.size()), pointers.data());
-    std::fflush(nullptr);
-    outcome.err = ::testing::internal::GetCapturedStderr();
-    outcome.out = ::testing::internal::GetCapturedStdout();
-    fs::current_path(before);
-    return outcome;
-  }
-
   // Renders something tiny; `more` are further arguments.
   Outcome render(std::vector<std::string> more) {
     std::vector<std::string> arguments{"render", "single", "--size", "16x8", "--quiet"};
@@ -76,16 +35,6 @@ class Cli : public ::testing::Test {
   Receipt receipt_of(const std::string& file) {
     return read_receipt(read_image(folder_ / file).metadata, file);
   }
-
-  std::vector<std::string> files() const {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder_))
-      names.push_back(entry.path().filename().string());
-    std::sort(names.begin(), names.end());
-    return names;
-  }
-
-  fs::path folder_;
 };
 
 bool is_one_line(const std::string& text) { return std::count(text.begin(), text.end(), '\n') == 1; }
@@ -182,7 +131,7 @@ TEST_F(Cli, MistakesAreOneSentenceAndLeaveNothingBehind) {
     EXPECT_EQ(outcome.err.find("lumigrove: error: "), 0u) << outcome.err;
     EXPECT_NE(outcome.err.find(mistake.part_of_message), std::string::npos)
         << "'" << mistake.part_of_message << "' is not in " << outcome.err;
-    EXPECT_EQ(files(), std::vector<std::string>{}) << outcome.err;
+    EXPECT_EQ(folder_.entries(), std::vector<std::string>{}) << outcome.err;
   }
 }
 
@@ -249,7 +198,7 @@ TEST_F(Cli, QuietSaysNothing) {
   const Outcome outcome = render({"-o", "a.exr", "-o", "a.png"});
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(outcome.out + outcome.err, "");
-  EXPECT_EQ(files(), (std::vector<std::string>{"a.exr", "a.png"}));
+  EXPECT_EQ(folder_.entries(), (std::vector<std::string>{"a.exr", "a.png"}));
 }
 
 TEST_F(Cli, ProgressOffATerminalIsPlainLines) {
@@ -279,7 +228,7 @@ TEST_F(Cli, StatsTellTimesAndBytesPerLight) {
 
 TEST_F(Cli, LogFileHoldsWhatQuietHides) {
   EXPECT_EQ(render({"-o", "a.exr", "--log-file", "log"}).err, "");
-  EXPECT_NE(contents(folder_ / "log").find("loaded 'single'"), std::string::npos);
+  EXPECT_NE(read_text(folder_ / "log").find("loaded 'single'"), std::string::npos);
 }
 
 // --- settings
@@ -338,7 +287,7 @@ TEST_F(Cli, FramesWriteOneFileEach) {
   ASSERT_EQ(render({"-o", "a.exr", "-o", "b.##.png", "-o", "c_%03d.exr", "--frames", "8-12x2", "--fps", "10"})
                 .status,
             0);
-  EXPECT_EQ(files(),
+  EXPECT_EQ(folder_.entries(),
             (std::vector<std::string>{"a.0008.exr", "a.0010.exr", "a.0012.exr", "b.08.png", "b.10.png",
                                       "b.12.png", "c_008.exr", "c_010.exr", "c_012.exr"}));
   const Settings settings = receipt_of("a.0012.exr").settings;
@@ -349,8 +298,8 @@ TEST_F(Cli, FramesWriteOneFileEach) {
 TEST_F(Cli, ExistingFramesAreLeftOutOnRequest) {
   std::ofstream(folder_ / "a.0001.exr") << "mine";
   ASSERT_EQ(render({"-o", "a.exr", "--frames", "0-2", "--skip-existing"}).status, 0);
-  EXPECT_EQ(files().size(), 3u);
-  EXPECT_EQ(contents(folder_ / "a.0001.exr"), "mine");
+  EXPECT_EQ(folder_.entries().size(), 3u);
+  EXPECT_EQ(read_text(folder_ / "a.0001.exr"), "mine");
 }
 
 TEST_F(Cli, AnimatedScenesChangeFromFrameToFrame) {
@@ -372,7 +321,7 @@ TEST_F(Cli, RerunReproducesEveryLayerBitForBit) {
   const Outcome outcome = run({"rerun", "a.exr", "--check", "-o", "b.exr", "-t", "3"});
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   expect_same_pixels(read_image(folder_ / "a.exr"), read_image(folder_ / "b.exr"));
-  EXPECT_EQ(files(), (std::vector<std::string>{"a.exr", "b.exr"}));
+  EXPECT_EQ(folder_.entries(), (std::vector<std::string>{"a.exr", "b.exr"}));
 }
 
 TEST_F(Cli, RerunNoticesOtherPixels) {
@@ -421,7 +370,7 @@ TEST_F(Cli, LostOutputIsAFailure) {
   ASSERT_NE(waitpid(start_tool("list settings", "/dev/full", err), &status, 0), -1);
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 1);
-  EXPECT_TRUE(is_one_line(contents(err))) << contents(err);
+  EXPECT_TRUE(is_one_line(read_text(err))) << read_text(err);
 }
 
 TEST_F(Cli, InterruptKeepsTheFinishedSamples) {
@@ -432,16 +381,16 @@ TEST_F(Cli, InterruptKeepsTheFinishedSamples) {
       err);
   int status = 0;
   pid_t ended = 0;
-  while (ended == 0 && contents(err).find("spp_done") == std::string::npos) {
+  while (ended == 0 && read_text(err).find("spp_done") == std::string::npos) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
     ended = waitpid(child, &status, WNOHANG);
   }
-  ASSERT_EQ(ended, 0) << contents(err);
+  ASSERT_EQ(ended, 0) << read_text(err);
   kill(child, SIGINT);
   ASSERT_EQ(waitpid(child, &status, 0), child);
   ASSERT_TRUE(WIFEXITED(status));
   EXPECT_EQ(WEXITSTATUS(status), 128 + SIGINT);
-  EXPECT_NE(contents(err).find("interrupted"), std::string::npos) << contents(err);
+  EXPECT_NE(read_text(err).find("interrupted"), std::string::npos) << read_text(err);
   const Receipt receipt = receipt_of("a.exr");
   EXPECT_GE(receipt.spp_done, 1);
   EXPECT_LT(receipt.spp_done, kAsked);

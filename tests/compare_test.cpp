@@ -5,20 +5,14 @@
 #include <nlohmann/json.hpp>
 
 #include "image/difference.h"
-#include "temp_folder.h"
-#include "tool.h"
+#include "tool_runner.h"
 
 namespace lumigrove {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Outcome {
-  int status = 0;  // as main() would return
-  std::string out, err;
-};
-
-class Compare : public testing::Test {
+class Compare : public ToolTest {
  protected:
   void SetUp() override {
     write("ref.exr", 1);
@@ -42,20 +36,10 @@ class Compare : public testing::Test {
 
   // compare -r ref.exr ARGUMENTS
   Outcome run(const std::vector<std::string>& arguments) const {
-    std::vector<std::string> words = {"lumigrove", "compare", "-r", path("ref.exr")};
+    std::vector<std::string> words{"compare", "-r", path("ref.exr")};
     words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> pointers;
-    for (std::string& word : words) pointers.push_back(word.data());
-    Outcome outcome;
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    outcome.status = run_tool(static_cast<int>(words.size()), pointers.data());
-    outcome.out = testing::internal::GetCapturedStdout();
-    outcome.err = testing::internal::GetCapturedStderr();
-    return outcome;
+    return ToolTest::run(words);
   }
-
-  const TempFolder folder_;
 };
 
 TEST_F(Compare, PrintsEveryMetricOfEveryImageAndTheFormulas) {

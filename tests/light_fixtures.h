@@ -15,6 +15,7 @@
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/light_tree/light_tree.h"
 #include "scene/scene_view.h"
+#include "statistics.h"
 
 namespace lumigrove::testing {
 
@@ -201,6 +202,23 @@ inline std::vector<Surface> shading_points(int n, std::uint32_t seed = 9) {
     surfaces.push_back(surface_at(random.in_box(vec3(-reach), vec3(reach)), random.direction()));
   }
   return surfaces;
+}
+
+// P-value (chi-square) of where walks down a tree end, at one of the emitters or at a dead branch, when they should
+// follow the pdf. walk(vec2 u) -> TreeSample, pdf(std::uint32_t emitter) -> float.
+template <class Walk, class Pdf>
+double walk_p_value(int draws, std::size_t emitters, Stream& random, const Walk& walk, const Pdf& pdf) {
+  std::vector<double> observed(emitters + 1, 0), expected(emitters + 1, 0);
+  for (int i = 0; i < draws; ++i) {
+    const vec4 u = random.next();
+    const TreeSample sample = walk(vec2(u.x, u.y));
+    ++observed[sample.emitter == kNoEmitter ? emitters : sample.emitter];
+  }
+  double total = 0;
+  for (std::uint32_t e = 0; e < emitters; ++e) total += expected[e] = draws * static_cast<double>(pdf(e));
+  expected[emitters] = draws - total;  // dead branches
+  if (expected[emitters] < 1e-3 * draws && observed[emitters] == 0) expected[emitters] = 0;
+  return chi_square_p_value(observed, expected);
 }
 
 struct NamedScene {

@@ -5,10 +5,10 @@
 #include <memory>
 
 #include "device/compact.h"
+#include "frame/explain.h"
 #include "frame/frame.h"
 #include "light_scenes.h"
 #include "lumigrove/renderer.h"
-#include "scene/camera_kernel.h"
 
 namespace lumigrove {
 namespace {
@@ -40,21 +40,11 @@ class PathBatch {
         world_(make_world(scene_, settings_with_mis(settings), stats_)) {}
 
   Light sample(Strategy strategy, int sample_number) {
-    const CameraView camera = make_camera_view(world_->camera, settings_.width, settings_.height);
-    const PixelWindow window{0, 0, settings_.width, settings_.height};
-    const auto n = static_cast<std::size_t>(window.count());
     DirectLighting lighting = make_direct_lighting(*world_, settings_, sample_number);
     lighting.mis = strategy == Strategy::kBoth;
-    std::vector<Ray> rays(n);
-    std::vector<Hit> hits(n);
-    std::vector<Surface> surfaces(n);
-    std::vector<std::uint32_t> pixels(n);
-    launch(window.count(), CameraKernel{camera, window, rays, pixels, lighting.rng.seed, lighting.rng.frame, false});
-    world_->tracer.closest(rays, hits, Coherence::kCoherent);
-    launch(window.count(),
-           SurfaceKernel{world_->arrays.view(), rays, hits, surfaces, settings_.force_diffuse});
-
-    Light light{std::vector<vec3>(n, vec3(0)), std::vector<vec3>(n, vec3(0))};
+    const auto [surfaces, pixels] = see_surfaces(*world_, settings_, {0, 0, settings_.width, settings_.height}, false);
+    const std::vector<vec3> black(surfaces.size(), vec3(0));
+    Light light{black, black};
     PathTracing tracing;
     tracing.lighting = lighting;
     tracing.first_spp = lighting.spp;

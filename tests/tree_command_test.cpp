@@ -4,48 +4,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
 
 #include "lumigrove/image.h"
 #include "lumigrove/scene.h"
-#include "temp_folder.h"
-#include "tool.h"
+#include "tool_runner.h"
 
 namespace lumigrove {
 namespace {
 
-namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-struct Outcome {
-  int status = -1;
-  std::string out, err;
-};
-
-// Works in an empty folder of its own, on a small tree of a small image.
-class TreeCommand : public ::testing::Test {
+// On a small tree of a small image.
+class TreeCommand : public ToolTest {
  protected:
-  Outcome run(const std::vector<std::string>& arguments) {
-    std::vector<std::string> words{"lumigrove"};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> pointers;
-    for (std::string& word : words) pointers.push_back(word.data());
-    const fs::path before = fs::current_path();
-    fs::current_path(folder_.path());
-    ::testing::internal::CaptureStdout();
-    ::testing::internal::CaptureStderr();
-    Outcome outcome;
-    outcome.status = run_tool(static_cast<int>(words.size()), pointers.data());
-    std::fflush(nullptr);
-    outcome.err = ::testing::internal::GetCapturedStderr();
-    outcome.out = ::testing::internal::GetCapturedStdout();
-    fs::current_path(before);
-    return outcome;
-  }
-
   Outcome tree(const std::vector<std::string>& more) {
     std::vector<std::string> arguments{"tree", "cornell-lights", "--set", "indirect.vpls=3000"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -58,8 +32,6 @@ class TreeCommand : public ::testing::Test {
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     return Json::parse(outcome.out);
   }
-
-  TempFolder folder_;
 };
 
 void expect_refused(const Outcome& outcome, const std::string& word) {
