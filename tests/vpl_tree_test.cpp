@@ -25,10 +25,11 @@ constexpr float kClamp = 0.2f;  // 1/m^2; reached by lights nearer than 2.2 m
 class VplLights {
  public:
   VplLights(std::vector<Vpl> vpls, int width, bool cones, LightBvh::Options bvh) : vpls_(std::move(vpls)) {
+    const float floor = bvh.floor;
     Box3 bounds;
     for (const Vpl& vpl : vpls_) bounds = unite(bounds, vpl.position);
     set_.gather({vpls_, bounds, 10}, kClamp);
-    tree_.build(set_.view(), {width, cones, true});
+    tree_.build(set_.view(), {width, cones, true, floor});
     bvh_.build(set_.view(), bvh);
     std::vector<float> flux;
     for (std::uint32_t i = 0; i < vpls_.size(); ++i) flux.push_back(emitter_flux(set_.view(), i));
@@ -64,8 +65,9 @@ struct TreeKind {
 };
 std::vector<TreeKind> tree_kinds() {
   return {{2, false, {Hierarchy::kSaoh, Weights::kSaoh, true}},
-          {16, true, {Hierarchy::kAgglomerative, Weights::kMinMax, true}},
-          {8, true, {Hierarchy::kSaoh, Weights::kMinMax, false}}};
+          {16, true, {Hierarchy::kAgglomerative, Weights::kMinMax, true, 0.7f}},
+          {8, true, {Hierarchy::kSaoh, Weights::kSaoh, true, 3}},
+          {4, true, {Hierarchy::kSaoh, Weights::kMinMax, false, 20}}};  // wider than all
 }
 
 // What one light sends to the viewer, by the code of virtual point lights.
@@ -173,7 +175,7 @@ TEST(VplLightTree, FrequenciesFollowTheProbabilities) {
             if (!(sample.pdf > 0)) continue;
             EXPECT_NEAR(pdf_choose_emitter(sampler, s, sample.emitter) / sample.pdf, 1, 1e-4) << named.name;
           }
-          // 36 comparisons.
+          // 48 comparisons.
           EXPECT_GT(chi_square_p_value(observed, expected), 1e-5) << named.name;
         }
       }
@@ -195,7 +197,7 @@ TEST(VplLightTree, MeanOfEverySelectionIsTheSumOfAll) {
           RunningMean mean;
           for (int i = 0; i < kDraws; ++i)
             mean.add(static_cast<double>(luminance(sent_by(sampler, sample_light(sampler, s, random.next()), s))));
-          // 108 comparisons.
+          // 144 comparisons.
           EXPECT_TRUE(mean_within(mean, truth, 4.9, 1e-4 * truth)) << named.name << ", " << static_cast<int>(choice);
         }
       }

@@ -202,14 +202,14 @@ bool uses_vpl_light_tree(const IndirectSettings& s) {
   return s.transport == Transport::kVpl && !s.joint && (uses_tree(s) || uses_bvh(s));
 }
 
-// One tree over all lights of `lights`: a perfect one or a BVH.
+// One tree over all lights of `lights`: a perfect one or a BVH. `floor`: least distance in the weights, metres.
 StructureStats build_light_tree(const LightView& lights, const SelectionSettings& settings, bool keep_leaves,
-                                LightTree& tree, LightBvh& bvh) {
+                                float floor, LightTree& tree, LightBvh& bvh) {
   if (!uses_bvh(settings)) {
-    tree.build(lights, {settings.width, settings.cones, keep_leaves});
+    tree.build(lights, {settings.width, settings.cones, keep_leaves, floor});
     return {"perfect tree", tree.build_ms(), tree.bytes(), tree.view().count};
   }
-  bvh.build(lights, {settings.hierarchy, settings.weights, settings.cones});
+  bvh.build(lights, {settings.hierarchy, settings.weights, settings.cones, floor});
   return {settings.hierarchy == Hierarchy::kSaoh ? "SAOH tree" : "agglomerative tree", bvh.build_ms(), bvh.bytes(),
           bvh.view().count};
 }
@@ -270,7 +270,7 @@ void set_selection(const SelectionSettings& settings, const Settings& frame, int
       sampler.choice = LightChoice::kTree;
       lighting.use_cuts = true;
       const float floor = settings.cut_floor * sampler.lights.bounds.diagonal();
-      lighting.cut = {settings.spp, std::max(floor * floor, sampler.tree.inside2), settings.cut_bound};
+      lighting.cut = {settings.spp, std::max(floor * floor, sampler.tree.floor2), settings.cut_bound};
       lighting.lookup.share = settings.cut_share;
       lighting.lookup.interleave = settings.cut_interleave;
       lighting.lookup.frame = static_cast<std::uint32_t>(frame.frame) + static_cast<std::uint32_t>(sample);
@@ -330,7 +330,7 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   if (uses_tree(direct) && direct.hierarchy == Hierarchy::kTwoLevel)
     build_two_level_tree(world, direct, stats);
   else if (uses_tree(direct) || uses_bvh(direct))
-    stats.structures.push_back(build_light_tree(lights, direct, direct.mis, world.tree, world.bvh));
+    stats.structures.push_back(build_light_tree(lights, direct, direct.mis, 0, world.tree, world.bvh));
   if (direct.selection == Selection::kPower) stats.structures.push_back(build_alias_table(world.alias, lights));
 }
 
@@ -342,8 +342,10 @@ void build_vpl_structures(World& world, const IndirectSettings& indirect, Render
   const float d = vpls.diagonal;
   if (uses_vpl_light_tree(indirect)) {
     world.vpl_lights.gather(vpls, vpl_clamp(indirect, d));
-    set_vpl_structure(stats, "VPL", {"light set", world.vpl_lights.gather_ms(), world.vpl_lights.bytes(), vpls.vpls.size()});
-    StructureStats tree = build_light_tree(world.vpl_lights.view(), indirect, false, world.vpl_tree, world.vpl_bvh);
+    set_vpl_structure(stats, "VPL",
+                      {"light set", world.vpl_lights.gather_ms(), world.vpl_lights.bytes(), vpls.vpls.size()});
+    StructureStats tree = build_light_tree(world.vpl_lights.view(), indirect, false, indirect.distance_floor * d,
+                                           world.vpl_tree, world.vpl_bvh);
     if (indirect.hierarchy == Hierarchy::kPerfect) tree.name = "light tree";
     set_vpl_structure(stats, "VPL", tree);
   } else if (indirect.selection == Selection::kRoot) {
@@ -365,9 +367,11 @@ void build_joint_structures(World& world, const Settings& settings, RenderStats&
   const VplView vpls = world.vpls.view();
   world.vpl_lights.gather_behind(world.lights.view(), vpls, vpl_clamp(settings.indirect, vpls.diagonal));
   const LightView lights = world.vpl_lights.view();
-  set_vpl_structure(stats, "joint", {"light set", world.vpl_lights.gather_ms(), world.vpl_lights.bytes(), lights.emitters.size()});
+  set_vpl_structure(stats, "joint",
+                    {"light set", world.vpl_lights.gather_ms(), world.vpl_lights.bytes(), lights.emitters.size()});
   if (uses_tree(direct) || uses_bvh(direct)) {
-    StructureStats tree = build_light_tree(lights, direct, direct.mis, world.tree, world.bvh);
+    const float floor = settings.indirect.distance_floor * vpls.diagonal;
+    StructureStats tree = build_light_tree(lights, direct, direct.mis, floor, world.tree, world.bvh);
     if (direct.hierarchy == Hierarchy::kPerfect) tree.name = "light tree";
     set_vpl_structure(stats, "joint", tree);
   }

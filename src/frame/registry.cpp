@@ -355,7 +355,7 @@ std::vector<Setting> vpl_rows() {
           "direct.weights"),
       real(
           "indirect.distance_floor", [](auto& s) -> auto& { return s.indirect.distance_floor; }, {0, 1}, "D",
-          "Least distance in the weights of the substitute tree"),
+          "Least distance in the weights of trees over VPLs; 0 = none"),
       flag(
           "indirect.gloss", [](auto& s) -> auto& { return s.indirect.gloss; },
           "VPLs light gloss lobes too (the substitute tree by walks of their own); otherwise only diffuse reflection"),

@@ -10,9 +10,10 @@
 // Departures  Nodes have W children (2 is the paper's tree; 4, 8 and 16 weigh their children in one pass over SoA
 //             rows, with eqs. 1-2 normalised over W instead of 2). Bogus leaves are not stored, except to fill the
 //             last node of a level: their intensity is 0. Emitters of no flux are sorted last and left out. Points
-//             closer than 1e-7 D to a box count as inside it. The horizon test has a relative margin of 1e-6, so
-//             that rounding never makes a light at the horizon impossible. F_j is the highest corner's height over
-//             the nearest distance.
+//             closer than 1e-7 D to a box count as inside it. Virtual point lights lie on the very surfaces that they
+//             light: over them distances have a floor (BoxNearness), and no point counts as inside. The horizon test
+//             has a relative margin of 1e-6, so that rounding never makes a light at the horizon impossible. F_j is
+//             the highest corner's height over the nearest distance. Gloss is not in the weights, as in the paper.
 //             With `cones`, weights also have a bound of the emitters' own cosine, which the paper leaves out: half
 //             of all samples of closed meshes would otherwise fall on emitters that face away.
 // Estimator   unbiased: every emitter that can contribute at x has positive probability, and the probability
@@ -55,6 +56,16 @@ struct alignas(W * sizeof(float)) LightNode {
   std::uint8_t radius[W];                       // in units of 2/kConeRadius
 };
 
+// How near boxes count. Those within inside2 hold the point, and then are the only ones that count; below 0: none do.
+// Others are taken to be no nearer than floor2. m^2.
+struct BoxNearness {
+  float inside2, floor2;
+
+  LUMI_HD BoxNearness(float squared) : inside2(squared), floor2(squared) {}
+  LUMI_HD BoxNearness(float inside_squared, float floor_squared)
+      : inside2(floor_squared > inside_squared ? -1 : inside_squared), floor2(floor_squared) {}
+};
+
 struct LightTreeView {
   const std::byte* nodes = nullptr;              // LightNode<width>, level by level from the root
   const std::uint32_t* leaf_emitters = nullptr;  // leaf -> emitter
@@ -65,7 +76,10 @@ struct LightTreeView {
   std::uint32_t count = 0;                         // leaves
   int root_children = 0;                           // that are not bogus
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
+  float floor2 = 0;                                // least squared distance in the weights, m^2
   int first_cones = 0;  // first level whose weights bound the emitters' own cosine; `levels` for none
+
+  LUMI_HD BoxNearness nearness() const { return {inside2, floor2}; }
 
   // Node k of level l holds children W*k..W*k+W-1 of level l+1.
   template <int W>
@@ -146,8 +160,8 @@ struct BoxWeights {
 // `cones` is asked for ConeLanes only when `use_cones`.
 template <int W, class Cones>
 LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, bool use_cones, const Cones& cones,
-                                                     float inside2, const LaneVec3<W>& x, const LaneVec3<W>& n) {
-  const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), inside = broadcast<W>(inside2);
+                                                     BoxNearness nearness, const LaneVec3<W>& x, const LaneVec3<W>& n) {
+  const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), floor2 = broadcast<W>(nearness.floor2);
   const LaneVec3<W>& half = box.half;
   const LaneVec3<W> to_centre{box.centre.x - x.x, box.centre.y - x.y, box.centre.z - x.z};
   const LaneVec3<W> apart = abs_lanes<W>(to_centre);
@@ -155,9 +169,10 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
                             max_lanes<W>(apart.z - half.z, zero)};
   const LaneVec3<W> farthest{apart.x + half.x, apart.y + half.y, apart.z + half.z};
   const Lanes<W> near2 = dot<W>(nearest, nearest), far2 = dot<W>(farthest, farthest);
-  const Lanes<W> inverse_near = reciprocal_sqrt<W>(max_lanes<W>(near2, inside));
-  const Lanes<W> inverse_far = reciprocal_sqrt<W>(max_lanes<W>(far2, inside));
-  const Lanes<W> far = far2 * inverse_far;
+  const Lanes<W> bounded_far2 = max_lanes<W>(far2, floor2);
+  const Lanes<W> inverse_near = reciprocal_sqrt<W>(max_lanes<W>(near2, floor2));
+  const Lanes<W> inverse_far = reciprocal_sqrt<W>(bounded_far2);
+  const Lanes<W> far = bounded_far2 * inverse_far;
 
   // Height of the box's highest corner above the tangent plane.
   const Lanes<W> margin = far * 2e-6f;
@@ -169,7 +184,7 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
     shining = shining * min_lanes<W>(max_lanes<W>(facing, zero) * inverse_near, one);
   }
   return {shining * (inverse_near * inverse_near), shining * (inverse_far * inverse_far),
-          keep_if_not_above<W>(near2, inside, shining)};
+          keep_if_not_above<W>(near2, broadcast<W>(nearness.inside2), shining)};
 }
 
 template <int W>
@@ -190,9 +205,9 @@ LUMI_HD inline Lanes<W> lanes_in_range(int first, int count) {
 // Equations 1 and 2 for the W children of a node at once. `lanes` are the node's boxes, those that do not count without intensity.
 template <int W>
 LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node, bool cones,
-                                                          float inside2, vec3 x, vec3 n) {
+                                                          BoxNearness nearness, vec3 x, vec3 n) {
   const BoxWeights<W> boxes = weigh_boxes<W>(
-      lanes, cones, [&] { return load_cones<W>(node); }, inside2, broadcast<W>(x), broadcast<W>(n));
+      lanes, cones, [&] { return load_cones<W>(node); }, nearness, broadcast<W>(x), broadcast<W>(n));
   // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
   const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
   const Lanes<W> near = select_lanes<W>(is_inside, boxes.inside, boxes.near);
@@ -205,9 +220,9 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, con
 }
 
 template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, float inside2,
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, BoxNearness nearness,
                                                           vec3 x, vec3 n) {
-  return weigh_children<W>(load_boxes<W>(node), node, cones, inside2, x, n);
+  return weigh_children<W>(load_boxes<W>(node), node, cones, nearness, x, n);
 }
 
 struct ChosenChild {
@@ -284,7 +299,7 @@ LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, co
   for (int c = 0; c < W; ++c) near[c] = far[c] = inside[c] = zero;
   for (int c = begin; c < end; ++c) {
     const BoxWeights<P> box = weigh_boxes<P>(
-        broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.inside2,
+        broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.nearness(),
         x, n);
     near[c] = box.near;
     far[c] = box.far;
@@ -350,7 +365,7 @@ LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkP
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
     const ChildWeights<W> children = weigh_children<W>(nodes[state.node[i]], level >= tree.first_cones,
-                                                       tree.inside2, points.position(i), points.normal(i));
+                                                       tree.nearness(), points.position(i), points.normal(i));
     const ChosenChild chosen = choose_child<W>(children, second_number ? points.u1[i] : state.r[i]);
     state.node[i] = state.node[i] * W + static_cast<std::uint32_t>(chosen.lane);
     state.pdf[i] *= chosen.probability;
@@ -399,7 +414,7 @@ LUMI_HD inline float pdf_light_tree(const LightTreeView& tree, Subtree start, ve
     const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
     BoxLanes<W> boxes = load_boxes<W>(node);
     if (level == start.level) boxes.intensity = boxes.intensity * lanes_in_range<W>(start.first, start.children);
-    const ChildWeights<W> children = weigh_children<W>(boxes, node, level >= tree.first_cones, tree.inside2, x, n);
+    const ChildWeights<W> children = weigh_children<W>(boxes, node, level >= tree.first_cones, tree.nearness(), x, n);
     if (!(children.total > 0)) return 0;
     alignas(64) float weights[W];
     store_lanes<W>(children.weight, weights);

@@ -121,7 +121,7 @@ LUMI_HD LUMI_ALWAYS_INLINE void step_mesh_walks(MeshWalks& walks, int level, Tre
     const LightTreeView& tree = *walks.trees[i];
     const ChildWeights<W> children =
         weigh_children<W>(tree.level<W>(level)[state.node[i]], walks.cones[i] && level >= tree.first_cones,
-                          tree.inside2, walks.points.position(i), walks.points.normal(i));
+                          tree.nearness(), walks.points.position(i), walks.points.normal(i));
     if (!(children.total > 0)) {
       samples[i] = {};
       continue;
