@@ -41,18 +41,41 @@ ImageMean direct_mean(const Settings& settings) { return image_mean(render(many_
 
 TEST(FrameLightBvh, EveryTreeHasTheMeanOfAllLights) {
   const ImageMean truth = direct_mean(view_of("exhaustive", 30));
-  Settings ats = view_of("ats", 100), capped = ats, averaged = ats, whole = ats, agglomerative = ats, min_max = ats;
+  Settings ats = view_of("ats", 100), capped = ats, averaged = ats, whole = ats, agglomerative = ats, min_max = ats,
+           yuksel = ats;
   capped.direct.split = 0.95f, capped.direct.split_cap = 3;
   averaged.direct.spp = 3, averaged.spp = 40;
   whole.direct.split = 0, whole.spp = 600;
   agglomerative.direct.hierarchy = Hierarchy::kAgglomerative;
   min_max.direct.weights = Weights::kMinMax;
-  for (const Settings* settings : {&ats, &capped, &averaged, &whole, &agglomerative, &min_max}) {
+  yuksel.direct.weights = Weights::kYuksel;
+  for (const Settings* settings : {&ats, &capped, &averaged, &whole, &agglomerative, &min_max, &yuksel}) {
     const ImageMean found = direct_mean(*settings);
     const double error = std::hypot(found.standard_error, truth.standard_error);
-    // 6 comparisons: 4 standard errors keep false alarms below one in two thousand.
+    // 7 comparisons: 4 standard errors keep false alarms below one in two thousand.
     EXPECT_TRUE(mean_within(found.mean, error, truth.mean, 4, 1e-4 * truth.mean));
     EXPECT_LT(error, 0.02 * truth.mean);
+  }
+}
+
+TEST(FrameLightBvh, PartsHaveTheMeanOfAllLightsBesideBsdfSamples) {
+  Scene scene = many_lights();
+  for (Material& material : scene.materials)
+    if (max_component(material.emission) == 0) material.metallic = 1, material.roughness = 0.3f;
+  const auto mean_of = [&](const char* preset, bool mis, int samples, int spp) {
+    Settings settings = view_of(preset, spp);
+    settings.force_diffuse = false;
+    settings.direct.mis = mis;
+    settings.direct.spp = samples;
+    return image_mean(render(scene, settings), "direct");
+  };
+  const ImageMean truth = mean_of("exhaustive", true, 1, 40);
+  for (const int samples : {1, 3}) {
+    const ImageMean both = mean_of("ats", true, samples, 120), light = mean_of("ats", false, samples, 120);
+    const double error = std::hypot(both.standard_error, truth.standard_error);
+    EXPECT_TRUE(mean_within(both.mean, error, truth.mean, 4, 1e-4 * truth.mean));
+    EXPECT_LT(error, 0.02 * truth.mean);
+    EXPECT_LT(both.standard_error, light.standard_error);
   }
 }
 

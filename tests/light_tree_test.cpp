@@ -13,10 +13,13 @@ namespace {
 using namespace lumigrove::testing;
 
 constexpr LightTree::Options kTrees[] = {{2, false, true},  {4, false, true}, {8, false, true}, {16, false, true},
-                                         {2, true, true},   {4, true, true},  {8, true, true},  {16, true, true}};
+                                         {2, true, true},   {4, true, true},  {8, true, true},  {16, true, true},
+                                         {2, false, true, Weights::kYuksel},  {4, true, true, Weights::kYuksel},
+                                         {8, false, true, Weights::kYuksel},  {16, true, true, Weights::kYuksel}};
 
 std::string name_of(const LightTree::Options& tree) {
-  return "width " + std::to_string(tree.width) + (tree.cones ? " with cones" : "");
+  return "width " + std::to_string(tree.width) + (tree.cones ? " with cones" : "") +
+         (tree.weights == Weights::kYuksel ? ", Yuksel's weights" : "");
 }
 
 template <int W>
@@ -108,11 +111,47 @@ TEST(LightTree, FrequenciesFollowThePdf) {
         const double p = walk_p_value(
             kDraws, n, random, [&](vec2 u) { return sample_tree(tree, s.position, s.normal, u); },
             [&](std::uint32_t e) { return pdf_tree(tree, whole_tree(tree), s.position, s.normal, e); });
-        // 192 tests in all: 1e-5 each keeps false alarms below one in five hundred.
+        // 288 tests in all: 1e-5 each keeps false alarms below one in three hundred.
         EXPECT_GT(p, 1e-5) << named.name << ", " << name_of(tree_options);
       }
     }
   }
+}
+
+// Yuksel's weights of up to 16 lights under one node, without cones: cosine bound times intensity, over the squared
+// distance to each box unless that is less than the box's diagonal for any light above the horizon.
+TEST(LightTree, YukselsWeightsAreTheirFormula) {
+  const LightWorld world(triangle_cloud(16, 1.0f, 17), {16, false, true, Weights::kYuksel});
+  const LightTreeView tree = world.tree().view();
+  const LightView lights = world.lights();
+  ASSERT_EQ(tree.levels, 1);
+  int near_points = 0, far_points = 0;
+  for (const Surface& s : shading_points(400)) {
+    std::vector<double> plain(lights.emitters.size()), distance2 = plain;
+    bool too_near = false, unclear = false;
+    for (std::uint32_t e = 0; e < lights.emitters.size(); ++e) {
+      const Box3 box = emitter_bounds(lights.emitters[e]);
+      const glm::dvec3 lo(box.lo - s.position), hi(box.hi - s.position), n(s.normal);
+      const glm::dvec3 nearest = glm::clamp(glm::dvec3(0), lo, hi);
+      const glm::dvec3 top = glm::mix(lo, hi, glm::greaterThan(n, glm::dvec3(0)));
+      const double diagonal2 = glm::dot(hi - lo, hi - lo);
+      distance2[e] = glm::dot(nearest, nearest);
+      const double cosine = std::clamp(glm::dot(top, n) / std::sqrt(std::max(distance2[e], 1e-12)), 0.0, 1.0);
+      plain[e] = cosine * static_cast<double>(emitter_intensity(lights, e));
+      too_near = too_near || (plain[e] > 0 && distance2[e] < diagonal2);
+      unclear = unclear || std::abs(distance2[e] - diagonal2) < 1e-3 * diagonal2 || (cosine > 0 && cosine < 0.02);
+    }
+    if (unclear) continue;
+    ++(too_near ? near_points : far_points);
+    double sum = 0;
+    for (std::size_t e = 0; e < plain.size(); ++e) sum += too_near ? plain[e] : plain[e] / distance2[e];
+    for (std::uint32_t e = 0; e < plain.size(); ++e) {
+      const double share = sum > 0 ? (too_near ? plain[e] : plain[e] / distance2[e]) / sum : 0.0;
+      EXPECT_NEAR(pdf_tree(tree, whole_tree(tree), s.position, s.normal, e), share, 1e-3 * share + 1e-9);
+    }
+  }
+  EXPECT_GT(near_points, 30);
+  EXPECT_GT(far_points, 50);
 }
 
 // Property: light that can arrive has positive probability, at points inside and outside boxes and at grazing
@@ -184,17 +223,20 @@ TEST(LightTree, SameBitsForAnyThreadCount) {
 }
 
 TEST(LightTree, ScalingTheSceneChangesNoProbability) {
-  constexpr float kScale = 1024;  // a power of two: exact in floating point
-  Scene scene = uneven_mix(), scaled = scene;
-  for (Mesh& mesh : scaled.meshes)
-    for (vec3& p : mesh.positions) p *= kScale;
-  for (Node& node : scaled.nodes) node.translation *= kScale;
-  for (PunctualLight& light : scaled.lights) light.color *= kScale * kScale;  // as flux of surfaces grows
-  const LightWorld a(scene), b(scaled);
-  for (const Surface& s : shading_points(100))
-    for (std::uint32_t e = 0; e < a.lights().emitters.size(); ++e)
-      EXPECT_EQ(pdf_tree(a.tree().view(), whole_tree(a.tree().view()), s.position, s.normal, e),
-                pdf_tree(b.tree().view(), whole_tree(b.tree().view()), s.position * kScale, s.normal, e));
+  for (const Weights weights : {Weights::kMinMax, Weights::kYuksel}) {
+    constexpr float kScale = 1024;  // a power of two: exact in floating point
+    Scene scene = uneven_mix(), scaled = scene;
+    for (Mesh& mesh : scaled.meshes)
+      for (vec3& p : mesh.positions) p *= kScale;
+    for (Node& node : scaled.nodes) node.translation *= kScale;
+    for (PunctualLight& light : scaled.lights) light.color *= kScale * kScale;  // as flux of surfaces grows
+    const LightTree::Options options{16, true, true, weights};
+    const LightWorld a(scene, options), b(scaled, options);
+    for (const Surface& s : shading_points(100))
+      for (std::uint32_t e = 0; e < a.lights().emitters.size(); ++e)
+        EXPECT_EQ(pdf_tree(a.tree().view(), whole_tree(a.tree().view()), s.position, s.normal, e),
+                  pdf_tree(b.tree().view(), whole_tree(b.tree().view()), s.position * kScale, s.normal, e));
+  }
 }
 
 TEST(LightTree, AMillionLightsStayWithinTheirBytesAndAreReachable) {

@@ -249,6 +249,67 @@ TEST(SharedCuts, HaveTheExhaustiveSumAsMean) {
   }
 }
 
+// A glossy floor under lamps of very different sizes, a sun and a sky.
+Scene glossy_floor() {
+  SceneBuilder b;
+  b.quad(vec3(-3, 0, -3), vec3(0, 0, 6), vec3(6, 0, 0), b.material(vec3(0.8f), vec3(0), 1, 0.25f));
+  Stream random(41);
+  for (int i = 0; i < 24; ++i) {
+    const int bright = b.material(vec3(0), random.in_box(vec3(0.5f), vec3(3)));
+    const float size = i % 4 == 0 ? 1.2f : 0.15f;
+    const vec3 corner = random.in_box(vec3(-2.5f, 0.2f, -2.8f), vec3(1.5f, 1.2f, -1.5f));
+    b.quad(corner, vec3(size, 0, 0), vec3(0, size, 0), bright);
+  }
+  PunctualLight sun;
+  sun.type = LightType::kDirectional;
+  sun.color = vec3(0.3f);
+  b.punctual(sun, vec3(0), glm::normalize(vec3(0.4f, -1, -0.3f)));
+  b.scene.environment.radiance = vec3(0.15f);
+  return b.scene;
+}
+
+struct MisVariant {
+  int nodes, share, interleave, width;
+  bool cones;
+};
+
+Settings glossy_view(const std::string& preset, const MisVariant& v, bool mis, int spp) {
+  Settings settings = square_view(preset, 20, vec3(0.3f, 1.7f, 3.4f), vec3(0, 0, -0.3f), 50);
+  settings.spp = spp;
+  settings.force_diffuse = false;
+  settings.direct.mis = mis;
+  settings.direct.spp = v.nodes;
+  settings.direct.cut_share = v.share;
+  settings.direct.cut_interleave = v.interleave;
+  settings.direct.width = v.width;
+  settings.direct.cones = v.cones;
+  return settings;
+}
+
+TEST(SharedCuts, HaveTheExhaustiveSumAsMeanBesideBsdfSamples) {
+  const Scene scene = glossy_floor();
+  const Image truth = render(scene, glossy_view("exhaustive", {1, 8, 1, 16, true}, true, 200));
+  for (const MisVariant& v : {MisVariant{8, 8, 1, 16, true}, MisVariant{5, 1, 1, 2, false},
+                              MisVariant{8, 8, 2, 16, true}, MisVariant{3, 4, 3, 4, true}})
+    expect_same_mean(render(scene, glossy_view("rtslc", v, true, 144)), truth, v.interleave == 1,
+                     std::to_string(v.nodes) + " nodes, shared by " + std::to_string(v.share) + ", interleaved by " +
+                         std::to_string(v.interleave));
+}
+
+double summed_variance(const Image& image) {
+  double sum = 0;
+  for (const float v : image.find("variance")->values) sum += static_cast<double>(v);
+  return sum;
+}
+
+TEST(SharedCuts, BsdfSamplesBesideThemLessenTheNoiseOfGloss) {
+  const Scene scene = glossy_floor();
+  for (const MisVariant& v : {MisVariant{8, 8, 1, 16, true}, MisVariant{8, 8, 2, 16, true}}) {
+    const double without = summed_variance(render(scene, glossy_view("rtslc", v, false, 64)));
+    EXPECT_LT(summed_variance(render(scene, glossy_view("rtslc", v, true, 64))), 0.5 * without);
+  }
+}
+
 TEST(SharedCuts, SpreadTheSamplesOverTheLights) {
   const Scene scene = room_of_lights();
   const auto noise = [&](int nodes) {
@@ -284,9 +345,6 @@ TEST(SharedCuts, RefuseWhatTheyCannotDo) {
   EXPECT_THROW(check(settings), Error);
   settings = make_preset("rtslc");
   settings.direct.hierarchy = Hierarchy::kNone;
-  EXPECT_THROW(check(settings), Error);
-  settings = make_preset("rtslc");
-  settings.direct.mis = true;
   EXPECT_THROW(check(settings), Error);
 }
 

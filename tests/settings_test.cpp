@@ -151,11 +151,6 @@ TEST(Settings, CheckRefusesWhatMakesNoSense) {
                     s.direct.selection = Selection::kCut;
                   }),
                   "cuts the perfect tree only");
-  expect_contains(refusal([](Settings& s) {
-                    s = make_preset("ats");
-                    s.direct.mis = true;
-                  }),
-                  "does not combine with splitting");
   expect_contains(refusal([](Settings& s) { s.width = s.height = 65536; }), "too large");
   expect_contains(refusal([](Settings& s) { s.pixel_bounds = {{0, 9, 0, 721}}; }), "pixel_bounds");
   expect_contains(refusal([](Settings& s) { s.pixel_bounds = {{4, 4, 0, 7}}; }), "pixel_bounds");

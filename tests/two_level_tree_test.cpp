@@ -168,11 +168,12 @@ class TwoLevelWorld {
 };
 
 constexpr LightTree::Options kTrees[] = {
-    {2, false, true}, {4, true, true}, {8, true, true}, {16, true, true}};
+    {2, false, true}, {4, true, true}, {8, true, true}, {16, true, true}, {2, false, true, Weights::kYuksel},
+    {16, true, true, Weights::kYuksel}};
 
 std::string name_of(const NamedScene& scene, const LightTree::Options& tree) {
   return std::string(scene.name) + ", width " + std::to_string(tree.width) +
-         (tree.cones ? " with cones" : "");
+         (tree.cones ? " with cones" : "") + (tree.weights == Weights::kYuksel ? ", Yuksel's weights" : "");
 }
 
 TreeSample draw(const LightSampler& sampler, const Surface& s, Stream& random) {
@@ -232,7 +233,7 @@ TEST(TwoLevelTree, FrequenciesFollowThePdf) {
         const double p = walk_p_value(
             kDraws, n, random, [&](vec2 u) { return choose_emitter(sampler, s, u); },
             [&](std::uint32_t e) { return pdf_choose_emitter(sampler, s, e); });
-        // 96 tests in all: 1e-5 each keeps false alarms below one in a thousand.
+        // 144 tests in all: 1e-5 each keeps false alarms below one in six hundred.
         EXPECT_GT(p, 1e-5) << name_of(named, options);
       }
     }
@@ -295,23 +296,26 @@ double sample_value(const LightSample& sample, const Surface& s) {
 TEST(TwoLevelTree, MeanIsTheExhaustiveSum) {
   constexpr int kDraws = 30000, kRounds = 100;
   for (const NamedScene& named : instance_scenes()) {
-    const TwoLevelWorld world(named.scene);
-    const LightSampler sampler = world.sampler();
+    const TwoLevelWorld world(named.scene), yuksel(named.scene, {16, true, true, Weights::kYuksel});
+    const LightSampler sampler = world.sampler(), by_yuksel = yuksel.sampler();
     Stream random(21);
     for (const Surface& s : shading_points(4, 43)) {
       LightSampler every = sampler;
       every.choice = LightChoice::kOne;
-      RunningMean truth, mean;
+      RunningMean truth;
       for (int i = 0; i < kRounds; ++i) {
         double sum = 0;
         for (every.one = 0; every.one < light_count(every.lights); ++every.one)
           sum += sample_value(sample_light(every, s, random.next()), s);
         truth.add(sum);
       }
-      for (int i = 0; i < kDraws; ++i) mean.add(sample_value(sample_light(sampler, s, random.next()), s));
-      const double error = std::hypot(mean.standard_error(), truth.standard_error());
-      // 32 comparisons: 4.5 standard errors keep false alarms below one in a thousand.
-      EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * error + 1e-6 * truth.mean()) << named.name;
+      for (const LightSampler* by_tree : {&sampler, &by_yuksel}) {
+        RunningMean mean;
+        for (int i = 0; i < kDraws; ++i) mean.add(sample_value(sample_light(*by_tree, s, random.next()), s));
+        const double error = std::hypot(mean.standard_error(), truth.standard_error());
+        // 64 comparisons: 4.5 standard errors keep false alarms below one in a thousand.
+        EXPECT_NEAR(mean.mean(), truth.mean(), 4.5 * error + 1e-6 * truth.mean()) << named.name;
+      }
     }
   }
 }

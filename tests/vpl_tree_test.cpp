@@ -29,7 +29,7 @@ class VplLights {
     Box3 bounds;
     for (const Vpl& vpl : vpls_) bounds = unite(bounds, vpl.position);
     set_.gather({vpls_, bounds, 10}, kClamp);
-    tree_.build(set_.view(), {width, cones, true, floor});
+    tree_.build(set_.view(), {width, cones, true, cones ? Weights::kMinMax : Weights::kYuksel, floor});
     bvh_.build(set_.view(), bvh);
     std::vector<float> flux;
     for (std::uint32_t i = 0; i < vpls_.size(); ++i) flux.push_back(emitter_flux(set_.view(), i));
@@ -67,7 +67,7 @@ std::vector<TreeKind> tree_kinds() {
   return {{2, false, {Hierarchy::kSaoh, Weights::kSaoh, true}},
           {16, true, {Hierarchy::kAgglomerative, Weights::kMinMax, true, 0.7f}},
           {8, true, {Hierarchy::kSaoh, Weights::kSaoh, true, 3}},
-          {4, true, {Hierarchy::kSaoh, Weights::kMinMax, false, 20}}};  // wider than all
+          {4, true, {Hierarchy::kSaoh, Weights::kYuksel, false, 20}}};  // wider than all
 }
 
 // What one light sends to the viewer, by the code of virtual point lights.
@@ -351,6 +351,7 @@ struct NamedValues {
 std::vector<NamedValues> tree_selections() {
   return {{"perfect", {{"hierarchy", "perfect"}, {"weights", "min-max"}, {"width", "4"}}, 120},
           {"cones, three samples", {{"hierarchy", "perfect"}, {"weights", "min-max"}, {"cones", "true"}, {"spp", "3"}}, 50},
+          {"yuksel", {{"hierarchy", "perfect"}, {"weights", "yuksel"}}, 120},
           {"saoh", {{"hierarchy", "saoh"}, {"weights", "saoh"}}, 120},
           {"agglomerative, split", {{"hierarchy", "agglomerative"}, {"weights", "min-max"}, {"split", "0.8"}}, 30},
           {"cut", {{"hierarchy", "perfect"}, {"weights", "min-max"}, {"selection", "cut"}, {"spp", "8"}}, 30},
@@ -416,6 +417,8 @@ TEST(FrameVplTree, JointLayersHaveTheMeansOfSeparateOnes) {
   const RunningMean direct = layer_means(room_of_lamps(), separate, kRenders).direct;
   const double indirect = mean_of_all_vpls();
   std::vector<NamedValues> selections = tree_selections();
+  selections.push_back({"BSDF samples", {{"mis", "true"}, {"spp", "2"}}, 60});
+  selections.push_back({"cut, BSDF samples", {{"mis", "true"}, {"selection", "cut"}, {"spp", "8"}}, 30});
   selections.push_back({"power", {{"selection", "power"}, {"hierarchy", "none"}, {"spp", "16"}}, 40});
   for (const NamedValues& named : selections) {
     SCOPED_TRACE(named.name);
@@ -484,7 +487,7 @@ TEST(FrameVplTree, StructuresAreNamedForWhatTheyServe) {
   const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
   const std::string tree = names(with_values(room_view(), "indirect", tree_selections()[0]));
   EXPECT_TRUE(has(tree, "VPL light tree (VPLs)") && has(tree, "perfect tree;") && !has(tree, "substitute")) << tree;
-  const std::string saoh = names(with_values(room_view(), "indirect", tree_selections()[2]));
+  const std::string saoh = names(with_values(room_view(), "indirect", tree_selections()[3]));
   EXPECT_TRUE(has(saoh, "VPL SAOH tree (VPLs)")) << saoh;
   Settings joint = room_view();
   joint.indirect.joint = true;
@@ -526,7 +529,7 @@ TEST(FrameVplTree, SenselessCombinationsAreRefusedInOneSentence) {
   EXPECT_EQ(refusal({{"indirect.hierarchy", "perfect"}, {"indirect.weights", "min-max"}}), "");
   expect_says(refusal({{"indirect.hierarchy", "perfect"}}),
               {"indirect.weights 'distance-bounded' needs indirect.hierarchy 'substitute'", "use 'min-max'"});
-  expect_says(refusal({{"indirect.hierarchy", "saoh"}, {"indirect.weights", "yuksel"}}), {"use 'min-max' or 'saoh'"});
+  expect_says(refusal({{"indirect.hierarchy", "saoh"}, {"indirect.weights", "in-box"}}), {"use 'min-max' or 'yuksel' or 'saoh'"});
   expect_says(refusal({{"indirect.weights", "saoh"}}),
               {"needs indirect.hierarchy 'saoh' or 'agglomerative'", "'distance-bounded' or 'in-box' or 'yuksel'"});
   expect_says(refusal({{"indirect.selection", "cut"}}), {"indirect.selection 'cut' cuts the perfect tree only"});

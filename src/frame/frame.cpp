@@ -70,11 +70,15 @@ DirectLighting away_from_camera(DirectLighting direct) {
   return direct;
 }
 
-// Paths go on from the first hits as settings.indirect asks; with MIS their first ray also finds direct light.
-PathTracing make_path_tracing(const Settings& settings, const DirectLighting& direct) {
+// Paths go on from the first hits as settings.indirect asks; with MIS their first ray also finds direct light, beside
+// the samples that were taken with `buffers`.
+PathTracing make_path_tracing(const Settings& settings, const DirectLighting& direct,
+                              const DirectBuffers& buffers) {
   PathTracing tracing;
   tracing.lighting = away_from_camera(direct);
-  tracing.first_spp = direct.spp;
+  tracing.first_spp = direct.use_cuts ? direct.lookup.passes(direct.cut.size) : direct.spp;
+  if (direct.use_cuts) tracing.first_cuts = samples_below(buffers.cuts, direct.lookup);
+  if (direct.use_split) tracing.first_split = {buffers.split_entries, buffers.split_counts, direct.split.cap};
   tracing.max_bounces = settings.indirect.transport == Transport::kPath ? settings.indirect.max_bounces : 0;
   tracing.roulette_start = settings.indirect.roulette_start;
   tracing.light_scale = settings.light_scale;
@@ -120,8 +124,8 @@ void light_tile(const World& world, const Settings& settings, DirectLighting dir
   direct.lookup.window = indirect.light_tree.lookup.window = tile;
   b.direct_buffers.vpl_sum = settings.indirect.joint ? std::span<vec3>(b.indirect) : std::span<vec3>();
   add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
-  add_path_light(make_path_tracing(settings, direct), b.surfaces, b.pixels, b.path_buffers, b.direct,
-                 b.indirect);
+  add_path_light(make_path_tracing(settings, direct, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,
+                 b.direct, b.indirect);
   if (settings.indirect.transport == Transport::kVpl) {
     b.indirect_buffers.wants_traces = !film.walks.empty();
     add_indirect_light(indirect, b.surfaces, b.pixels, kDimIndirect, b.indirect_buffers, b.indirect);
@@ -206,7 +210,7 @@ bool uses_vpl_light_tree(const IndirectSettings& s) {
 StructureStats build_light_tree(const LightView& lights, const SelectionSettings& settings, bool keep_leaves,
                                 float floor, LightTree& tree, LightBvh& bvh) {
   if (!uses_bvh(settings)) {
-    tree.build(lights, {settings.width, settings.cones, keep_leaves, floor});
+    tree.build(lights, {settings.width, settings.cones, keep_leaves, settings.weights, floor});
     return {"perfect tree", tree.build_ms(), tree.bytes(), tree.view().count};
   }
   bvh.build(lights, {settings.hierarchy, settings.weights, settings.cones, floor});
@@ -217,7 +221,8 @@ StructureStats build_light_tree(const LightView& lights, const SelectionSettings
 void build_two_level_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
   TwoLevelTree& tree = world.two_level;
   const int meshes = tree.meshes_built();
-  tree.build(world.arrays.view(), world.lights.view(), {settings.width, settings.cones, settings.mis});
+  tree.build(world.arrays.view(), world.lights.view(),
+             {settings.width, settings.cones, settings.mis, settings.weights});
   if (tree.meshes_built() > meshes)
     stats.structures.push_back({"bottom trees", tree.mesh_ms(), tree.mesh_bytes(), tree.mesh_triangles()});
   stats.structures.push_back({"two-level tree", tree.build_ms(), tree.bytes(), tree.top().view().count});

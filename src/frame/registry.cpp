@@ -279,9 +279,11 @@ std::vector<Setting> direct_rows() {
           "two are binary"),
       choice(
           "direct.weights", [](auto& s) -> auto& { return s.direct.weights; },
-          vector<pair<string, Weights>>{{"min-max", Weights::kMinMax}, {"saoh", Weights::kSaoh}},
-          "Weights of a node's children: mean of those at least and at greatest distance, or at the centre with bounds of the "
-          "angles (hierarchies saoh and agglomerative)"),
+          vector<pair<string, Weights>>{
+              {"min-max", Weights::kMinMax}, {"yuksel", Weights::kYuksel}, {"saoh", Weights::kSaoh}},
+          "Weights of a node's children: mean of those at least and at greatest distance; at the least, left out for all "
+          "of them when a box is wider than far; or at the centre with bounds of the angles (hierarchies saoh and "
+          "agglomerative)"),
       flag(
           "direct.mis", [](auto& s) -> auto& { return s.direct.mis; },
           "Combine light samples with BSDF samples (balance heuristic)"),
@@ -472,8 +474,8 @@ void check_cuts(const std::string& prefix, const SelectionSettings& s) {
 // Weights that a hierarchy can have, in the words of the rows.
 std::vector<std::string> weights_of(Hierarchy h) {
   if (h == Hierarchy::kSubstitute) return {"distance-bounded", "in-box", "yuksel"};
-  if (is_bvh(h)) return {"min-max", "saoh"};
-  return {"min-max"};
+  if (is_bvh(h)) return {"min-max", "yuksel", "saoh"};
+  return {"min-max", "yuksel"};
 }
 
 void check_weights(const std::string& prefix, const Settings& all, const SelectionSettings& s) {
@@ -498,14 +500,6 @@ void check_selection(const std::string& prefix, const Settings& all, const Selec
   if (s.split > 0 && !is_bvh(s.hierarchy))
     throw Error(
         fmt::format("{0}.split needs {0}.hierarchy 'saoh' or 'agglomerative'; for others use 0", prefix));
-}
-
-void check_mis(const DirectSettings& s) {
-  if (!s.mis) return;
-  if (s.selection == Selection::kCut)
-    throw Error("direct.mis does not combine with cuts; set direct.selection 'root' or direct.mis false");
-  if (s.selection == Selection::kRoot && s.split > 0)
-    throw Error("direct.mis does not combine with splitting; set direct.split 0 or direct.mis false");
 }
 
 void check_joint(const Settings& s) {
@@ -656,7 +650,6 @@ void check(const Settings& s) {
   check_image(s);
   if (s.view) check_view(*s.view);
   check_selection("direct", s, s.direct);
-  check_mis(s.direct);
   check_vpls(s);
 }
 

@@ -21,7 +21,7 @@ class LightBvh {
   struct Options {
     Hierarchy builder = Hierarchy::kSaoh;  // kSaoh or kAgglomerative
     Weights weights = Weights::kMinMax;
-    bool cones = true;  // of kMinMax
+    bool cones = true;  // not of kSaoh
     float floor = 0;    // as LightTree::Options
   };
   // Buffers are reused by the next build.

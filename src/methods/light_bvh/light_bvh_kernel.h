@@ -6,18 +6,26 @@
 //             "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020): 3.2 weights, and trees of both builders as
 //             what theirs is compared with; B. Walter et al., "Fast Agglomerative Clustering for Rendering", RT 2008,
 //             for the builder `agglomerative`.
+//             Formulas of the first are those of implementations that cite its equations (Cycles' branch of 2018,
+//             Falcor, pbrt-v4 and section 12.6 of its book), which it was checked against instead of the text.
 // Symbols     E -> intensity -> Y of the peak radiant intensity below a child, as a share of all local flux
 //             theta_o -> cone -> bounds the emitters' normals; theta_e = pi/2 for every light
-//             theta_u -> uncertainty -> angle that the sphere around the box spans at x
+//             theta_u -> uncertainty -> half the angle that the sphere around the box spans at x
 //             theta_i' , theta' -> angles at the receiver and at the emitters, less what is uncertain
 //             a, b -> near, far -> least and greatest distance to the box, in units of the diagonal of the lights' box
 //             e, N -> intensity / count, count -> of the emitters below a node; Var[e] from their second moment
 //             sigma -> standard deviation of the estimate of all light below a node from one of its lights
-// Equations   importance |cos theta_i'| E cos theta' / d^2 -> saoh_importance; E[g], Var[g] and sigma^2 = N^2 (Var[e] Var[g]
-//             + Var[e] E[g]^2 + E[e]^2 Var[g]) -> split_variance; (1 / (1 + sigma))^(1/4) < threshold -> should_split
-// Departures  d is not below the radius of the box's sphere, inside of which all cosines count as 1. Intensity and distance
-//             in sigma are relative to the lights as a whole, so that a threshold means the same in scenes of any size
-//             and brightness. Splitting goes level by level and ends at `cap` nodes; children that cannot contribute are
+// Equations   (3) importance f_a |cos theta_i'| E cos theta' / d^2 with f_a = 1 -> saoh_importance; (8, 9) mean and
+//             variance of g = 1 / d^2 with d uniform in [a, b] and (10) sigma^2 = N^2 (Var[e] Var[g] + Var[e] E[g]^2 +
+//             E[e]^2 Var[g]) -> split_variance; (1 / (1 + sigma))^(1/4) < threshold -> should_split; cost E M_A M_Omega of
+//             each half, times K_r -> saoh_cost, orientation_measure
+// Departures  d, to the box's centre, is not below the radius of the box's sphere, inside of which all cosines count as
+//             1; theirs is not below half of it, and only where nothing is split (pbrt-v4: d^2 is not below half the
+//             box's diagonal, a length). Boxes behind the surface have importance 0 (pbrt-v4: the absolute cosine, for
+//             transmission). a and b are to the box, and inside it nodes are always split; theirs: its sphere.
+//             K_r compares extents of the lights' centres (pbrt-v4: of their boxes). Intensity and distance in sigma are
+//             relative to the lights as a whole, so that a threshold means the same in scenes of any size and
+//             brightness. Splitting goes level by level and ends at `cap` nodes; children that cannot contribute are
 //             left out of the set. The second random number of a walk takes over once 12 bits of the first are used.
 // Estimator   unbiased: every emitter that can contribute at x has positive probability, which is returned exactly; the
 //             split set is a partition of all lights that can contribute, the same each time for a point and normal.
@@ -59,7 +67,7 @@ struct LightBvhView {
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
   float floor2 = 0;                                // least squared distance in the weights, m^2
   float unit2 = 1;                                 // squared unit of length of the splitting criterion, m^2
-  bool cones = true;                               // kMinMax: weights bound the emitters' own cosine
+  bool cones = true;                               // not kSaoh: weights bound the emitters' own cosine
   Weights weights = Weights::kMinMax;
 
   LUMI_HD BoxNearness nearness() const { return {inside2, floor2}; }
@@ -115,7 +123,8 @@ LUMI_HD inline float saoh_importance(const LightNode<2>& node, int c, float floo
 }
 
 LUMI_HD inline ChildWeights<2> weigh_children(const LightBvhView& bvh, const LightBvhNode& node, vec3 x, vec3 n) {
-  if (bvh.weights == Weights::kMinMax) return weigh_children<2>(node.bounds, bvh.cones, bvh.nearness(), x, n);
+  if (bvh.weights != Weights::kSaoh)
+    return weigh_children<2>(node.bounds, Weighing{bvh.weights, bvh.cones, bvh.nearness()}, x, n);
   const float weights[2] = {saoh_importance(node.bounds, 0, bvh.floor2, x, n),
                             saoh_importance(node.bounds, 1, bvh.floor2, x, n)};
   const float sums[2] = {weights[0], weights[0] + weights[1]};

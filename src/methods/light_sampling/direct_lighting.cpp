@@ -58,11 +58,10 @@ void add_cut_samples(const DirectLighting& lighting, std::span<const Surface> su
            CutKernel{lighting.sampler.tree, lighting.cut, lookup, lighting.rng, surfaces, buffers.cuts});
   }
   const int passes = lookup.passes(lighting.cut.size);
-  const float interleave2 = static_cast<float>(lookup.interleave * lookup.interleave);
-  for (int pass = 0; pass < passes; ++pass)
-    add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(passes),
-                   {buffers.cuts, lookup, pass, interleave2}, {}, {}, surfaces, pixels,
-                   dimension + 4 * static_cast<std::uint32_t>(pass), buffers, sum);
+  CutSamples samples = samples_below(buffers.cuts, lookup);
+  for (; samples.pass < passes; ++samples.pass)
+    add_one_sample(lighting, lighting.sampler, 1 / static_cast<float>(passes), samples, {}, {}, surfaces, pixels,
+                   dimension + 4 * static_cast<std::uint32_t>(samples.pass), buffers, sum);
 }
 
 // `spp` samples below each part of the light BVH, and as many of the lights at infinity. A surface with few parts is done

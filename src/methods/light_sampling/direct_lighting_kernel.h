@@ -19,6 +19,8 @@ struct CutSamples {
   CutLookup lookup;
   int pass = 0;
   float scale = 1;  // m^2: interleaved pixels sample only their share of the nodes
+
+  LUMI_HD const LightCut& cut_of(Pixel pixel) const { return cuts[static_cast<std::size_t>(lookup.block_of(pixel))]; }
 };
 
 // The split sets of a light BVH (SplitKernel), and which entry of each is sampled.
@@ -27,6 +29,31 @@ struct SplitSamples {
   std::span<const std::uint8_t> counts;
   int cap = 0, pass = 0;
 };
+
+LUMI_HD inline CutSamples samples_below(std::span<const LightCut> cuts, const CutLookup& lookup) {
+  return {cuts, lookup, 0, static_cast<float>(lookup.interleave * lookup.interleave)};
+}
+
+// How often, over all passes, surface i samples `emitter` below its cut: the mean over m^2 frames where pixels share
+// out the nodes. Both light and BSDF samples are weighed by it.
+LUMI_HD inline float pdf_below_cut(const LightSampler& sampler, const CutSamples& samples, const Surface& surface,
+                                   std::size_t i, std::uint32_t emitter) {
+  const LightCut& cut = samples.cut_of(pixel_of_index(samples.lookup.window, static_cast<int>(i)));
+  float pdf = 0;
+  for (int k = 0; k < cut.count; ++k)
+    pdf += pdf_tree(sampler.tree, cut.nodes[k], surface.position, surface.normal, emitter);
+  return group_probabilities(sampler, surface).local * pdf / samples.scale;
+}
+
+// The same below its split set.
+LUMI_HD inline float pdf_below_split(const LightSampler& sampler, const SplitSamples& samples, const Surface& surface,
+                                     std::size_t i, std::uint32_t emitter) {
+  const std::uint32_t* entries = samples.entries.data() + i * static_cast<std::size_t>(samples.cap);
+  float pdf = 0;
+  for (int k = 0; k < samples.counts[i]; ++k)
+    pdf += pdf_light_bvh(sampler.bvh, entries[k], surface.position, surface.normal, emitter);
+  return pdf;
+}
 
 // Of the samples that a surface takes one after another, each chooses its light in its own part of [0,1): neighbours in a
 // tree's order are neighbours in space.
@@ -148,7 +175,7 @@ struct DirectLightKernel {
   LUMI_HD Subtree start_of(std::size_t i) const {
     if (cuts.cuts.empty()) return whole_tree(sampler.tree);
     const Pixel pixel = pixel_of_index(cuts.lookup.window, static_cast<int>(i));
-    const LightCut& cut = cuts.cuts[static_cast<std::size_t>(cuts.lookup.block_of(pixel))];
+    const LightCut& cut = cuts.cut_of(pixel);
     const CutEntries entries = entries_of_pixel(cuts.lookup, pixel, cut.count);
     const int entry = entries.first + cuts.pass;
     return entry < entries.end ? cut.nodes[entry] : Subtree{};
@@ -272,8 +299,8 @@ struct DirectLightKernel {
     const float cosine = glm::dot(surface.normal, sample.wi);
     if (!(cosine > 0)) return;
     vec3 light = bsdf_of_sample(sampler, surface, sample) * sample.weight * (cosine * weight);
-    // Balance heuristic of n = 1 / scale light samples and one BSDF sample.
-    if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + scale * bsdf_pdf(surface, sample.wi));
+    // Balance heuristic of n = 1 / weight light samples and one BSDF sample.
+    if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + weight * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;
     if (!from_vpl.empty()) from_vpl[i] = sample.from_vpl ? 1 : 0;
     contribution[i] = light;

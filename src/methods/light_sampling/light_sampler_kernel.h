@@ -315,6 +315,14 @@ LUMI_HD inline float pdf_light_environment(const LightSampler& sampler, const Su
   return p > 0 ? p * pdf_environment(sampler.lights.environment, surface.normal, wi) : 0.0f;
 }
 
+// And where one of the lights at infinity is drawn beside the local ones.
+LUMI_HD inline float pdf_environment_beside_local(const LightSampler& sampler, const Surface& surface, vec3 wi) {
+  const GroupProbabilities p = group_probabilities(sampler, surface);
+  if (!(p.environment > 0)) return 0;
+  const float directional_share = p.directional / (p.directional + p.environment);
+  return (1 - directional_share) * pdf_environment(sampler.lights.environment, surface.normal, wi);
+}
+
 // Segment from the surface to the light sample; it stops short of the light by the same relative margin
 // everywhere.
 LUMI_HD inline Ray shadow_ray(const Surface& surface, const LightSample& sample, float diagonal) {

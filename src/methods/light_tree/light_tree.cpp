@@ -32,6 +32,7 @@ void LightTree::build_over(const Leaves& leaves, std::size_t count, const Box3& 
   const Stopwatch watch;
   view_ = {};
   view_.width = w;
+  view_.weights = options.weights;
   // Not below the smallest distance whose square a float resolves against the scene.
   view_.inside2 = std::max(1e-14f * diagonal * diagonal, 1e-30f);
   view_.floor2 = std::max(view_.inside2, options.floor * options.floor);

@@ -1,14 +1,17 @@
 // Method      Picks one emitter out of very many with probability close to its share of the light at a point, by
 //             one walk down a perfect tree over the emitters in Morton order.
 // Paper       D. Lin, C. Yuksel, "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020): 3.1 and 3.2;
-//             cosine bound and special cases as in the authors' code (distance 0, dead branches).
+//             cosine bound and special cases as in the authors' code (distance 0, dead branches). C. Yuksel,
+//             "Stochastic Lightcuts", HPG 2019, for the weights that theirs are compared with (Weights::kYuksel).
 // Symbols     I_j -> intensity -> Y of the peak radiant intensity under child j, as a share of all local flux
 //             F_j -> cosine -> bound of cos at the receiver over the child's box, no material
 //             d_j^min, d_j^max -> near2, far2 -> squared distance from x to the box's nearest / farthest point, m^2
 //             p_j -> weight / total -> probability of stepping to child j, given its parent
-// Equations   (1) w_j^min, w_j^max and (2) their normalisation, averaged -> weigh_children
+// Equations   (1) w_j^min, w_j^max and (2) their normalisation, averaged -> weigh_children; with kYuksel w_j^min alone,
+//             for all children without the distance where that to one of their boxes is less than the box's diagonal
 // Departures  Nodes have W children (2 is the paper's tree; 4, 8 and 16 weigh their children in one pass over SoA
-//             rows, with eqs. 1-2 normalised over W instead of 2). Bogus leaves are not stored, except to fill the
+//             rows, with eqs. 1-2, or Yuksel's weights, normalised over W instead of 2; boxes of children that cannot
+//             contribute are near to nothing). Bogus leaves are not stored, except to fill the
 //             last node of a level: their intensity is 0. Emitters of no flux are sorted last and left out. Points
 //             closer than 1e-7 D to a box count as inside it. Virtual point lights lie on the very surfaces that they
 //             light: over them distances have a floor (BoxNearness), and no point counts as inside. The horizon test
@@ -31,6 +34,7 @@
 #include "base/lanes.h"
 #include "base/vec.h"
 #include "lights/cone_lanes.h"
+#include "lumigrove/settings.h"
 
 namespace lumigrove {
 
@@ -78,6 +82,7 @@ struct LightTreeView {
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
   float floor2 = 0;                                // least squared distance in the weights, m^2
   int first_cones = 0;  // first level whose weights bound the emitters' own cosine; `levels` for none
+  Weights weights = Weights::kMinMax;  // or kYuksel
 
   LUMI_HD BoxNearness nearness() const { return {inside2, floor2}; }
 
@@ -101,6 +106,13 @@ LUMI_HD LUMI_ALWAYS_INLINE decltype(auto) with_width(int width, const Function& 
     default:
       return f(std::integral_constant<int, 16>());
   }
+}
+
+// f(std::integral_constant<Weights, weights>()) for the weights of a tree, so that walks need not ask at every step.
+template <class Function>
+LUMI_HD LUMI_ALWAYS_INLINE decltype(auto) with_weights(Weights weights, const Function& f) {
+  if (weights == Weights::kYuksel) return f(std::integral_constant<Weights, Weights::kYuksel>());
+  return f(std::integral_constant<Weights, Weights::kMinMax>());
 }
 
 // Children first, ..., first + children - 1 of a node, and all lights below them: where a walk starts. As nodes are W wide
@@ -151,16 +163,18 @@ LUMI_HD LUMI_ALWAYS_INLINE ConeLanes<P> broadcast_cone(const LightNode<W>& node,
           broadcast<P>(static_cast<float>(node.radius[c]))};
 }
 
-// Equation 1: w^max and w^min. `inside` is w^max without the distance where x is inside the box, elsewhere 0.
+// Equation 1: w^max and w^min, and either without the distance. `inside` is that where x is inside the box, or for
+// kYuksel nearer than its diagonal, elsewhere 0.
 template <int W>
 struct BoxWeights {
-  Lanes<W> near, far, inside;
+  Lanes<W> near, far, plain, inside;
 };
 
 // `cones` is asked for ConeLanes only when `use_cones`.
 template <int W, class Cones>
 LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, bool use_cones, const Cones& cones,
-                                                     BoxNearness nearness, const LaneVec3<W>& x, const LaneVec3<W>& n) {
+                                                     BoxNearness nearness, const LaneVec3<W>& x, const LaneVec3<W>& n,
+                                                     Weights weights = Weights::kMinMax) {
   const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), floor2 = broadcast<W>(nearness.floor2);
   const LaneVec3<W>& half = box.half;
   const LaneVec3<W> to_centre{box.centre.x - x.x, box.centre.y - x.y, box.centre.z - x.z};
@@ -183,8 +197,10 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
     const Lanes<W> facing = bound_facing<W>(cones(), to_centre, half, far);
     shining = shining * min_lanes<W>(max_lanes<W>(facing, zero) * inverse_near, one);
   }
-  return {shining * (inverse_near * inverse_near), shining * (inverse_far * inverse_far),
-          keep_if_not_above<W>(near2, broadcast<W>(nearness.inside2), shining)};
+  const Lanes<W> plain_inside = weights == Weights::kYuksel
+                                    ? choose_where_greater<W>(dot<W>(half, half) * 4.0f, near2, shining, zero)
+                                    : keep_if_not_above<W>(near2, broadcast<W>(nearness.inside2), shining);
+  return {shining * (inverse_near * inverse_near), shining * (inverse_far * inverse_far), shining, plain_inside};
 }
 
 template <int W>
@@ -202,14 +218,31 @@ LUMI_HD inline Lanes<W> lanes_in_range(int first, int count) {
   return load_lanes<W>(lanes);
 }
 
+// How the children of a node are weighed.
+struct Weighing {
+  Weights weights = Weights::kMinMax;  // or kYuksel
+  bool cones = true;                   // weights bound the emitters' own cosine
+  BoxNearness nearness = 0.0f;
+};
+
+LUMI_HD LUMI_ALWAYS_INLINE Weighing weighing_of_level(const LightTreeView& tree, int level, Weights weights) {
+  return {weights, level >= tree.first_cones, tree.nearness()};
+}
+
 // Equations 1 and 2 for the W children of a node at once. `lanes` are the node's boxes, those that do not count without intensity.
 template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node, bool cones,
-                                                          BoxNearness nearness, vec3 x, vec3 n) {
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node,
+                                                          const Weighing& weighing, vec3 x, vec3 n) {
   const BoxWeights<W> boxes = weigh_boxes<W>(
-      lanes, cones, [&] { return load_cones<W>(node); }, nearness, broadcast<W>(x), broadcast<W>(n));
-  // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
+      lanes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.nearness, broadcast<W>(x), broadcast<W>(n),
+      weighing.weights);
   const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
+  if (weighing.weights == Weights::kYuksel) {
+    const Lanes<W> weights = select_lanes<W>(is_inside, boxes.plain, boxes.near);
+    const Lanes<W> sums = prefix_sum<W>(weights);
+    return {weights, sums, sums[W - 1]};
+  }
+  // Where x is inside a box its nearest distance is 0: then only such boxes count, without the distance.
   const Lanes<W> near = select_lanes<W>(is_inside, boxes.inside, boxes.near);
   // Near weights are scaled to the sum of the far ones, so that the average of both needs no other division.
   const Lanes<W> near_sums = prefix_sum<W>(near), far_sums = prefix_sum<W>(boxes.far);
@@ -220,9 +253,9 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, con
 }
 
 template <int W>
-LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, bool cones, BoxNearness nearness,
-                                                          vec3 x, vec3 n) {
-  return weigh_children<W>(load_boxes<W>(node), node, cones, nearness, x, n);
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(const LightNode<W>& node, const Weighing& weighing, vec3 x,
+                                                          vec3 n) {
+  return weigh_children<W>(load_boxes<W>(node), node, weighing, x, n);
 }
 
 struct ChosenChild {
@@ -284,7 +317,7 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefix_sums_across(Lanes<P> (&a)[W]) {
 
 // The first step, which all walks take from one node: P points at once, child by child, instead of W children at once. A
 // start with few children then costs little.
-template <int W, int P>
+template <int W, int P, Weights kWeights>
 LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, const WalkPoints& points, int first,
                                     WalkState& state) {
   const LightNode<W>& node = tree.level<W>(start.level)[start.node];
@@ -296,18 +329,21 @@ LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, co
                       load_lanes<P>(points.nz + first)};
   Lanes<P> near[W], far[W], inside[W];
   Lanes<P> most_inside = zero;
+  constexpr bool kYuksel = kWeights == Weights::kYuksel;
   for (int c = 0; c < W; ++c) near[c] = far[c] = inside[c] = zero;
   for (int c = begin; c < end; ++c) {
     const BoxWeights<P> box = weigh_boxes<P>(
         broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.nearness(),
-        x, n);
+        x, n, kWeights);
     near[c] = box.near;
     far[c] = box.far;
-    inside[c] = box.inside;
+    inside[c] = kYuksel ? box.plain : box.inside;
     most_inside = max_lanes<P>(most_inside, box.inside);
   }
-  for (int c = begin; c < end; ++c)
+  for (int c = begin; c < end; ++c) {
     near[c] = choose_where_greater<P>(most_inside, zero, inside[c], near[c]);
+    if (kYuksel) far[c] = near[c];  // the scale below is then 1, and everything twice what weigh_children has
+  }
 
   Lanes<P> near_sums[W], far_sums[W];
   for (int c = 0; c < W; ++c) {
@@ -356,16 +392,17 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch_step(const LightTreeView& tree, int lev
 }
 
 // The step of every living walk from a level below the root.
-template <int W>
+template <int W, Weights kWeights>
 LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkPoints& points, int level,
                                           WalkState& state) {
   const LightNode<W>* nodes = tree.level<W>(level);
   const bool second_number = level == (tree.levels + 1) / 2;
+  const Weighing weighing = weighing_of_level(tree, level, kWeights);
   int kept = 0;
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
-    const ChildWeights<W> children = weigh_children<W>(nodes[state.node[i]], level >= tree.first_cones,
-                                                       tree.nearness(), points.position(i), points.normal(i));
+    const ChildWeights<W> children =
+        weigh_children<W>(nodes[state.node[i]], weighing, points.position(i), points.normal(i));
     const ChosenChild chosen = choose_child<W>(children, second_number ? points.u1[i] : state.r[i]);
     state.node[i] = state.node[i] * W + static_cast<std::uint32_t>(chosen.lane);
     state.pdf[i] *= chosen.probability;
@@ -377,26 +414,33 @@ LUMI_HD LUMI_ALWAYS_INLINE void step_down(const LightTreeView& tree, const WalkP
   state.living = kept;
 }
 
-// One walk down `start` for each of the first `count` points. start.children > 0.
-template <int W>
-LUMI_HD inline void sample_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
-                                      TreeSample* samples) {
+template <int W, Weights kWeights>
+LUMI_HD inline void walk_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
+                                    TreeSample* samples) {
   constexpr int kPoints = kWalkBatch < 16 ? kWalkBatch : 16;
   WalkState state;
   state.living = 0;
   for (int first = 0; first < count; first += kPoints)
-    step_from_start<W, kPoints>(tree, start, points, first, state);
+    step_from_start<W, kPoints, kWeights>(tree, start, points, first, state);
   for (int i = 0; i < count; ++i) {
     samples[i] = {};
     state.alive[state.living] = i;
     state.living += state.pdf[i] > 0 ? 1 : 0;
     prefetch_step<W>(tree, start.level + 1, state.node[i]);
   }
-  for (int level = start.level + 1; level < tree.levels; ++level) step_down<W>(tree, points, level, state);
+  for (int level = start.level + 1; level < tree.levels; ++level)
+    step_down<W, kWeights>(tree, points, level, state);
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
     samples[i] = {tree.leaf_emitters[state.node[i]], state.pdf[i]};
   }
+}
+
+// One walk down `start` for each of the first `count` points. start.children > 0.
+template <int W>
+LUMI_HD inline void sample_light_tree(const LightTreeView& tree, Subtree start, const WalkPoints& points, int count,
+                                      TreeSample* samples) {
+  with_weights(tree.weights, [&](auto weights) { walk_light_tree<W, weights>(tree, start, points, count, samples); });
 }
 
 // Probability with which sample_light_tree returns `emitter`: the same products, multiplied in the same order. 0 for an
@@ -414,7 +458,7 @@ LUMI_HD inline float pdf_light_tree(const LightTreeView& tree, Subtree start, ve
     const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
     BoxLanes<W> boxes = load_boxes<W>(node);
     if (level == start.level) boxes.intensity = boxes.intensity * lanes_in_range<W>(start.first, start.children);
-    const ChildWeights<W> children = weigh_children<W>(boxes, node, level >= tree.first_cones, tree.nearness(), x, n);
+    const ChildWeights<W> children = weigh_children<W>(boxes, node, weighing_of_level(tree, level, tree.weights), x, n);
     if (!(children.total > 0)) return 0;
     alignas(64) float weights[W];
     store_lanes<W>(children.weight, weights);

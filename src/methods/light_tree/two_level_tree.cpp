@@ -56,7 +56,8 @@ NormalMoments normal_moments(const MeshView& mesh, const EmissiveInstance& emiss
 }
 
 bool same(const LightTree::Options& a, const LightTree::Options& b) {
-  return a.width == b.width && a.cones == b.cones && a.keep_leaves == b.keep_leaves;
+  return a.width == b.width && a.cones == b.cones && a.keep_leaves == b.keep_leaves &&
+         a.weights == b.weights;
 }
 
 }  // namespace
@@ -141,7 +142,7 @@ void TwoLevelTree::build_top(const SceneView& scene, const LightView& lights) {
 
 MeshTreesView TwoLevelTree::view() const {
   return {instances_.data(), tree_views_.data(), instance_numbers_.data(),
-          static_cast<std::uint32_t>(sources_.size()), options_.width};
+          static_cast<std::uint32_t>(sources_.size()), options_.width, options_.weights};
 }
 
 std::size_t TwoLevelTree::mesh_bytes() const {

@@ -53,6 +53,7 @@ struct MeshTreesView {
   const std::uint32_t* instance_numbers = nullptr;  // instance of the scene -> its number in `instances`
   std::uint32_t punctual_first = 0;                 // number of the first point or spot light
   int width = 0;
+  Weights weights = Weights::kMinMax;
 
   LUMI_HD bool present() const { return instances != nullptr; }
 };
@@ -112,16 +113,17 @@ LUMI_HD inline void start_mesh_walks(const MeshTreesView& below, const WalkPoint
 }
 
 // One step of every walk; those that reach a leaf end.
-template <int W>
+template <int W, Weights kWeights>
 LUMI_HD LUMI_ALWAYS_INLINE void step_mesh_walks(MeshWalks& walks, int level, TreeSample* samples) {
   WalkState& state = walks.state;
   int kept = 0;
   for (int k = 0; k < state.living; ++k) {
     const int i = state.alive[k];
     const LightTreeView& tree = *walks.trees[i];
-    const ChildWeights<W> children =
-        weigh_children<W>(tree.level<W>(level)[state.node[i]], walks.cones[i] && level >= tree.first_cones,
-                          tree.nearness(), walks.points.position(i), walks.points.normal(i));
+    Weighing weighing = weighing_of_level(tree, level, kWeights);
+    weighing.cones = weighing.cones && walks.cones[i];
+    const ChildWeights<W> children = weigh_children<W>(tree.level<W>(level)[state.node[i]], weighing,
+                                                       walks.points.position(i), walks.points.normal(i));
     if (!(children.total > 0)) {
       samples[i] = {};
       continue;
@@ -142,9 +144,9 @@ LUMI_HD LUMI_ALWAYS_INLINE void step_mesh_walks(MeshWalks& walks, int level, Tre
   state.living = kept;
 }
 
-template <int W>
+template <int W, Weights kWeights>
 LUMI_HD inline void walk_mesh_trees(MeshWalks& walks, TreeSample* samples) {
-  for (int level = 0; walks.state.living > 0; ++level) step_mesh_walks<W>(walks, level, samples);
+  for (int level = 0; walks.state.living > 0; ++level) step_mesh_walks<W, kWeights>(walks, level, samples);
 }
 
 // samples[i] says which leaf of the top level was chosen for points i, and becomes an emitter.
@@ -152,7 +154,9 @@ LUMI_HD inline void sample_mesh_trees(const MeshTreesView& below, const WalkPoin
                                       TreeSample* samples) {
   MeshWalks walks;
   start_mesh_walks(below, points, count, samples, walks);
-  with_width(below.width, [&](auto w) { walk_mesh_trees<w>(walks, samples); });
+  with_width(below.width, [&](auto w) {
+    with_weights(below.weights, [&](auto weights) { walk_mesh_trees<w, weights>(walks, samples); });
+  });
 }
 
 // Number in MeshTreesView::instances of the leaf that holds an emitter.

@@ -22,8 +22,11 @@ struct Batch {
   std::span<vec3> film(int ray_number) const { return ray_number == 1 ? direct : indirect; }
   // Of light sampling at the surface that a ray left.
   LightDensity density(int ray_number) const {
-    const int samples = ray_number == 1 ? tracing.first_spp : tracing.lighting.spp;
-    return {tracing.lighting.sampler, tracing.lighting.all, tracing.bsdf_only, static_cast<float>(samples)};
+    const DirectLighting& lighting = tracing.lighting;
+    if (ray_number > 1)
+      return {lighting.sampler, lighting.all, tracing.bsdf_only, static_cast<float>(lighting.spp)};
+    return {lighting.sampler, lighting.all, tracing.bsdf_only, static_cast<float>(tracing.first_spp),
+            tracing.first_cuts, tracing.first_split};
   }
 };
 

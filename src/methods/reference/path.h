@@ -17,7 +17,9 @@ namespace lumigrove {
 // What all paths of a frame share. Plain data: copy freely.
 struct PathTracing {
   DirectLighting lighting;  // at every vertex after the first; its `mis` also weighs what BSDF samples find
-  int first_spp = 1;        // light samples that the caller takes at the first surface
+  int first_spp = 1;        // light samples that the caller takes at the first surface; with cuts their passes
+  CutSamples first_cuts;    // below whose nodes they are; none: of the whole tree
+  SplitSamples first_split;
   int max_bounces = 4;      // indirect bounces; 0: only the emitters that BSDF samples find (needs mis)
   int roulette_start = 3;   // first bounce that Russian roulette may end
   float light_scale = 1;    // settings.light_scale, which the light set was gathered with

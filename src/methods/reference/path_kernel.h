@@ -7,7 +7,7 @@
 //             p_b -> PathState::pdf, bsdf_pdf -> density of the BSDF sample, per steradian at the vertex
 //             it left
 //             n p_l -> pdf_of_hit, pdf_of_escape -> density of light sampling in that direction, likewise, times
-//             the number of light samples
+//             the number of light samples; below a cut or a split set the sum over its nodes, each sampled n times
 //             w_b = p_b / (p_b + n p_l) -> balance_weight -> weight of the BSDF sample; no unit
 // Equations   Veach & Guibas (9), balance heuristic -> balance_weight, and DirectLightKernel for light
 //             samples: the two weights of one direction sum to 1
@@ -24,7 +24,7 @@
 #include <span>
 
 #include "base/rng.h"
-#include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/light_sampling/direct_lighting_kernel.h"
 #include "scene/bsdf.h"
 #include "scene/surface_kernel.h"
 #include "trace/ray.h"
@@ -94,19 +94,25 @@ struct LightDensity {
   LightSampler sampler;
   bool all = false;   // every light is sampled, not one
   bool none = false;  // there is no light sampling
-  float samples = 1;  // n, of each light or of one
+  float samples = 1;  // n, of each light or of one; with cuts their passes
+  CutSamples cuts = {};  // of the first surfaces, by slot
+  SplitSamples split = {};
 
   // Of point `y` on the emissive triangle `emitter`, per steradian at `from`, times n. 0 if it is not in the
   // light set.
-  LUMI_HD float pdf_of_hit(const Surface& from, std::uint32_t emitter, vec3 y) const {
+  LUMI_HD float pdf_of_hit(const Surface& from, std::uint32_t slot, std::uint32_t emitter, vec3 y) const {
     if (none || emitter == kNoEmitter) return 0;
-    return samples * (all ? pdf_emitter_point(sampler.lights, emitter, from.position, y)
-                          : pdf_light(sampler, from, emitter, y));
+    if (cuts.cuts.empty() && split.counts.empty() && !all) return samples * pdf_light(sampler, from, emitter, y);
+    const float of_point = pdf_emitter_point(sampler.lights, emitter, from.position, y);
+    if (all) return samples * of_point;
+    if (!cuts.cuts.empty()) return pdf_below_cut(sampler, cuts, from, slot, emitter) * of_point;
+    return samples * pdf_below_split(sampler, split, from, slot, emitter) * of_point;
   }
   LUMI_HD float pdf_of_escape(const Surface& from, vec3 wi) const {
     if (none) return 0;
-    return samples * (all ? pdf_environment(sampler.lights.environment, from.normal, wi)
-                          : pdf_light_environment(sampler, from, wi));
+    if (all) return samples * pdf_environment(sampler.lights.environment, from.normal, wi);
+    return samples * (split.counts.empty() ? pdf_light_environment(sampler, from, wi)
+                                           : pdf_environment_beside_local(sampler, from, wi));
   }
 };
 
@@ -169,7 +175,7 @@ struct PathEmissionKernel {
     const Surface& hit = next_surfaces[j];
     if (!(max_component(hit.emission) > 0)) return;
     const PathState& path = next_paths[j];
-    const float pdf_light = density.pdf_of_hit(surfaces[kept[j]], hit.emitter, hit.position);
+    const float pdf_light = density.pdf_of_hit(surfaces[kept[j]], path.slot, hit.emitter, hit.position);
     sum[path.slot] += path.throughput * hit.emission * balance_weight(path.pdf, pdf_light);
   }
 };
