@@ -1,4 +1,4 @@
-// Error of light selection at equal time.
+// Error of light selection, at equal time or at equal samples.
 #include <cmath>
 
 #include "bench.h"
@@ -17,7 +17,7 @@ struct Contestant {
   Settings settings;
   std::unique_ptr<World> world;
 
-  Contestant(const Scene& scene, const char* preset) : settings(make_preset(preset)) {
+  Contestant(const Scene& scene, const Settings& asked) : settings(asked) {
     settings.width = kWidth;
     settings.height = kHeight;
     RenderStats stats;
@@ -55,13 +55,13 @@ struct Contestant {
 
 Result error_tree_power(const Options& options) {
   const Scene scene = load_scene("night-city");
-  Contestant tree(scene, "tree"), power(scene, "power");
+  Contestant tree(scene, make_preset("tree")), power(scene, make_preset("power"));
   const PairTimes times = time_in_turns(
       options.runs, [&] { tree.frame(kTreeSpp); }, [&] { power.frame(kTreeSpp); });
   // As many samples as power affords in the tree's time, to the nearest whole one.
   const int power_spp = std::max(1, static_cast<int>(std::lround(kTreeSpp * times.ratio)));
 
-  const RgbImage reference = Contestant(scene, "tree").render(kReferenceSpp, 1000);
+  const RgbImage reference = Contestant(scene, make_preset("tree")).render(kReferenceSpp, 1000);
   const double tree_rmse = tree.error(reference, kTreeSpp), power_rmse = power.error(reference, power_spp);
   return {tree_rmse / power_rmse,
           {{"tree samples a pixel", kTreeSpp},
@@ -69,6 +69,21 @@ Result error_tree_power(const Options& options) {
            {"time of a tree sample / of a power sample", times.ratio},
            {"tree RMSE", tree_rmse},
            {"power RMSE", power_rmse}}};
+}
+
+Result error_two_level_cut(const Options&) {
+  const Scene scene = load_scene("night-city");
+  Settings settings = make_preset("rtslc");
+  settings.jitter = false;  // edges are no matter of light selection
+  Contestant one_level(scene, settings);
+  settings.direct.hierarchy = Hierarchy::kTwoLevel;
+  Contestant two_level(scene, settings);
+  const RgbImage reference = one_level.render(kReferenceSpp / settings.direct.spp, 1000);
+  const double two = two_level.error(reference, 1), one = one_level.error(reference, 1);
+  return {two / one,
+          {{"nodes of a cut", static_cast<double>(settings.direct.spp)},
+           {"two levels, RMSE", two},
+           {"one level, RMSE", one}}};
 }
 
 }  // namespace lumigrove::bench

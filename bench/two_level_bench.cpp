@@ -55,6 +55,65 @@ Result sample_two_level(const Options& options, const std::string& scene) {
 
 }  // namespace
 
+namespace {
+
+// Frames lit below shared cuts.
+struct CutFrames {
+  Settings settings = make_preset("rtslc");
+  std::unique_ptr<World> world;
+  Film film{settings.width, settings.height};
+
+  CutFrames(const Scene& scene, Hierarchy hierarchy) {
+    settings.direct.hierarchy = hierarchy;
+    RenderStats stats;
+    world = make_world(scene, settings, stats);
+  }
+
+  struct Times {
+    double cuts = 0, selection = 0, shadow = 0;
+    double choice() const { return cuts + selection; }
+    double all() const { return choice() + shadow; }
+  };
+  Times render() {
+    RenderStats stats;
+    render_sample(*world, settings, 0, film, stats);
+    Times times;
+    for (const PassStats& pass : stats.passes) {
+      if (pass.name == "cuts") times.cuts = pass.ms;
+      if (pass.name == "light selection") times.selection = pass.ms;
+      if (pass.name == "shadow rays") times.shadow = pass.ms;
+    }
+    return times;
+  }
+};
+
+}  // namespace
+
+Result sample_two_level_cut_night_city(const Options& options) {
+  const Scene scene = load_scene("night-city");
+  CutFrames two_level(scene, Hierarchy::kTwoLevel), one_level(scene, Hierarchy::kPerfect);
+  two_level.render();
+  one_level.render();
+  std::vector<double> all, choice, cuts, two_ms, one_ms;
+  for (int i = 0; i < options.runs; ++i) {
+    const CutFrames::Times two = two_level.render(), one = one_level.render();
+    all.push_back(two.all() / one.all());
+    choice.push_back(two.choice() / one.choice());
+    cuts.push_back(two.cuts / two.all());
+    two_ms.push_back(two.all());
+    one_ms.push_back(one.all());
+  }
+  const auto [lowest, highest] = std::minmax_element(all.begin(), all.end());
+  const double lowest_ratio = *lowest, highest_ratio = *highest;
+  return {median(all),
+          {{"without shadow rays", median(choice)},
+           {"share of selecting cuts, two levels", median(cuts)},
+           {"two levels, ms", median(two_ms)},
+           {"one level, ms", median(one_ms)},
+           {"lowest_ratio", lowest_ratio},
+           {"highest_ratio", highest_ratio}}};
+}
+
 Result sample_two_level_night_city(const Options& options) { return sample_two_level(options, "night-city"); }
 Result sample_two_level_cornell_lights(const Options& options) {
   return sample_two_level(options, "cornell-lights");

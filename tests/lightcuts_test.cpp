@@ -29,13 +29,18 @@ LeafRange leaves_below(const LightTreeView& tree, Subtree s) {
 }
 
 LightCut cut_at(const LightTreeView& tree, const Surface& s, const CutOptions& options) {
+  LightSampler sampler;
+  sampler.choice = LightChoice::kTree;
+  sampler.tree = tree;
   LightCut cut;
-  with_width(tree.width, [&](auto w) { select_cut<w>(tree, s.position, s.normal, options, cut); });
+  select_cut(sampler, s.position, s.normal, options, cut);
   return cut;
 }
 
 SubtreeBounds bounds_at(const LightTreeView& tree, Subtree s) {
-  return with_width(tree.width, [&](auto w) { return bounds_of<w>(tree, s); });
+  return with_width(tree.width, [&](auto w) {
+    return bounds_of<w>(tree.level<w>(s.level)[s.node], s.first, s.children);
+  });
 }
 
 Scene cloud_of(int n) { return n >= 4 ? triangle_cloud(n, 0.2f, 11) : punctual_cloud(n, 12); }
@@ -52,7 +57,7 @@ TEST(LightCut, IsAPartitionOfAllLights) {
             ASSERT_LE(cut.count, size);
             ASSERT_GE(cut.count, 1);
             std::vector<LeafRange> ranges;
-            for (int i = 0; i < cut.count; ++i) ranges.push_back(leaves_below(tree, cut.nodes[i]));
+            for (int i = 0; i < cut.count; ++i) ranges.push_back(leaves_below(tree, cut.nodes[i].subtree));
             std::sort(ranges.begin(), ranges.end(), [](LeafRange a, LeafRange b) { return a.first < b.first; });
             std::uint32_t next = 0;
             for (const LeafRange& range : ranges) {
@@ -82,7 +87,7 @@ TEST(LightCut, SplitsTheLargestErrors) {
       continue;
     }
     const int worst = static_cast<int>(std::max_element(a.error, a.error + a.count) - a.error);
-    EXPECT_TRUE(std::none_of(b.nodes, b.nodes + b.count, [&](Subtree n) { return n == a.nodes[worst]; }));
+    EXPECT_TRUE(std::none_of(b.nodes, b.nodes + b.count, [&](const TreeStart& n) { return n == a.nodes[worst]; }));
   }
 }
 
@@ -93,8 +98,8 @@ TEST(LightCut, ErrorIsTheBoundOfThePaper) {
     const CutOptions options{16, 0.01f, CutBound::kExact};
     const LightCut cut = cut_at(tree, s, options);
     for (int i = 0; i < cut.count; ++i) {
-      const SubtreeBounds bounds = bounds_at(tree, cut.nodes[i]);
-      if (is_leaf(tree, cut.nodes[i])) {
+      const SubtreeBounds bounds = bounds_at(tree, cut.nodes[i].subtree);
+      if (is_leaf(tree, cut.nodes[i].subtree)) {
         EXPECT_EQ(cut.error[i], 0);
         continue;
       }
@@ -194,6 +199,42 @@ Scene room_of_lights() {
   return b.scene;
 }
 
+mat4 placed(vec3 at, vec3 axis, vec3 scale) {
+  const Frame frame = make_frame(glm::normalize(axis));
+  return mat4(vec4(frame.x * scale.x, 0), vec4(frame.y * scale.y, 0), vec4(frame.z * scale.z, 0), vec4(at, 1));
+}
+
+// The same room lit by three lamps of many triangles, shown many times: turned, mirrored, stretched.
+Scene room_of_lamps() {
+  Scene scene = room_of_lights();
+  std::erase_if(scene.nodes, [&](const Node& node) {
+    return !node.meshes.empty() &&
+           max_component(scene.materials[static_cast<std::size_t>(
+                                             scene.meshes[static_cast<std::size_t>(node.meshes[0])].material)]
+                             .emission) > 0;
+  });
+  Stream random(32);
+  std::vector<int> lamps;
+  for (int lamp = 0; lamp < 3; ++lamp) {
+    std::vector<vec3> corners;
+    for (int i = 0; i < 14; ++i)
+      add_triangle_of_size(corners, random, random.in_box(vec3(-0.3f), vec3(0.3f)), 0.06f);
+    lamps.push_back(add_mesh(scene, add_material(scene, random.in_box(vec3(2), vec3(12)), lamp == 1), corners));
+  }
+  for (int i = 0; i < 18; ++i) {
+    Node& node = add_node(scene, {lamps[static_cast<std::size_t>(i % 3)]});
+    node.has_matrix = true;
+    const vec3 scales[] = {vec3(1), vec3(-0.6f, 0.6f, 0.6f), vec3(2, 0.3f, 0.8f)};
+    node.matrix = placed(i < 9 ? random.in_box(vec3(-2.5f, 2.2f, -2.5f), vec3(2.5f, 2.7f, 2.5f))
+                               : random.in_box(vec3(-2, 0.5f, -2.5f), vec3(2, 1.5f, -1.2f)),
+                         random.direction(), scales[(i / 3) % 3]);
+  }
+  PunctualLight bulb;
+  bulb.color = vec3(0.5f);
+  add_light(scene, bulb, vec3(-1, 1.5f, 1));
+  return scene;
+}
+
 Settings view_of_lights(const std::string& preset, int spp) {
   Settings settings = square_view(preset, 20, vec3(0.3f, 1.7f, 3.4f), vec3(0, 0.7f, -1), 60);
   settings.spp = spp;
@@ -249,6 +290,33 @@ TEST(SharedCuts, HaveTheExhaustiveSumAsMean) {
   }
 }
 
+TEST(SharedCuts, OfEveryTreeHaveTheExhaustiveSumAsMean) {
+  const Scene scene = room_of_lamps();
+  const Image truth = render(scene, view_of_lights("exhaustive", 64));
+  struct Variant {
+    Hierarchy hierarchy;
+    Weights weights;
+    int nodes, share, interleave, width;
+  };
+  for (const Variant& v : {Variant{Hierarchy::kTwoLevel, Weights::kMinMax, 8, 8, 1, 16},
+                           Variant{Hierarchy::kTwoLevel, Weights::kMinMax, 8, 1, 2, 2},
+                           Variant{Hierarchy::kTwoLevel, Weights::kMinMax, 20, 4, 2, 4},
+                           Variant{Hierarchy::kSaoh, Weights::kSaoh, 8, 8, 1, 16},
+                           Variant{Hierarchy::kSaoh, Weights::kMinMax, 8, 1, 2, 16},
+                           Variant{Hierarchy::kAgglomerative, Weights::kMinMax, 20, 4, 2, 16}}) {
+    Settings settings = view_of_lights("rtslc", 96);
+    settings.direct.hierarchy = v.hierarchy;
+    settings.direct.weights = v.weights;
+    settings.direct.spp = v.nodes;
+    settings.direct.cut_share = v.share;
+    settings.direct.cut_interleave = v.interleave;
+    settings.direct.width = v.width;
+    expect_same_mean(render(scene, settings), truth, v.interleave == 1,
+                     get_value(settings, "direct.hierarchy") + ", " + std::to_string(v.nodes) + " nodes, shared by " +
+                         std::to_string(v.share) + ", interleaved by " + std::to_string(v.interleave));
+  }
+}
+
 // A glossy floor under lamps of very different sizes, a sun and a sky.
 Scene glossy_floor() {
   SceneBuilder b;
@@ -271,6 +339,7 @@ Scene glossy_floor() {
 struct MisVariant {
   int nodes, share, interleave, width;
   bool cones;
+  Hierarchy hierarchy = Hierarchy::kPerfect;
 };
 
 Settings glossy_view(const std::string& preset, const MisVariant& v, bool mis, int spp) {
@@ -278,6 +347,7 @@ Settings glossy_view(const std::string& preset, const MisVariant& v, bool mis, i
   settings.spp = spp;
   settings.force_diffuse = false;
   settings.direct.mis = mis;
+  settings.direct.hierarchy = v.hierarchy;
   settings.direct.spp = v.nodes;
   settings.direct.cut_share = v.share;
   settings.direct.cut_interleave = v.interleave;
@@ -290,7 +360,10 @@ TEST(SharedCuts, HaveTheExhaustiveSumAsMeanBesideBsdfSamples) {
   const Scene scene = glossy_floor();
   const Image truth = render(scene, glossy_view("exhaustive", {1, 8, 1, 16, true}, true, 200));
   for (const MisVariant& v : {MisVariant{8, 8, 1, 16, true}, MisVariant{5, 1, 1, 2, false},
-                              MisVariant{8, 8, 2, 16, true}, MisVariant{3, 4, 3, 4, true}})
+                              MisVariant{8, 8, 2, 16, true}, MisVariant{3, 4, 3, 4, true},
+                              MisVariant{8, 8, 2, 16, true, Hierarchy::kTwoLevel},
+                              MisVariant{20, 4, 1, 2, true, Hierarchy::kTwoLevel},
+                              MisVariant{8, 8, 2, 16, true, Hierarchy::kSaoh}})
     expect_same_mean(render(scene, glossy_view("rtslc", v, true, 144)), truth, v.interleave == 1,
                      std::to_string(v.nodes) + " nodes, shared by " + std::to_string(v.share) + ", interleaved by " +
                          std::to_string(v.interleave));
@@ -326,16 +399,17 @@ TEST(SharedCuts, SpreadTheSamplesOverTheLights) {
 }
 
 TEST(SharedCuts, DoNotDependOnThreadsOrCropWindows) {
-  const Scene scene = room_of_lights();
+  const Scene scene = room_of_lamps();
   Settings settings = view_of_lights("rtslc", 2);
   settings.width = 150;  // more than one tile
-  const Image one = [&] {
+  for (const Hierarchy hierarchy : {Hierarchy::kPerfect, Hierarchy::kTwoLevel, Hierarchy::kSaoh}) {
+    settings.direct.hierarchy = hierarchy;
     settings.threads = 1;
-    return render(scene, settings);
-  }();
-  for (const int threads : {2, 4}) {
-    settings.threads = threads;
-    EXPECT_EQ(render(scene, settings).find("direct")->values, one.find("direct")->values);
+    const Image one = render(scene, settings);
+    for (const int threads : {2, 4}) {
+      settings.threads = threads;
+      EXPECT_EQ(render(scene, settings).find("direct")->values, one.find("direct")->values);
+    }
   }
 }
 
@@ -345,6 +419,11 @@ TEST(SharedCuts, RefuseWhatTheyCannotDo) {
   EXPECT_THROW(check(settings), Error);
   settings = make_preset("rtslc");
   settings.direct.hierarchy = Hierarchy::kNone;
+  EXPECT_THROW(check(settings), Error);
+  settings = make_preset("rtslc");
+  settings.direct.hierarchy = Hierarchy::kSaoh;
+  EXPECT_NO_THROW(check(settings));
+  settings.direct.split = 0.5f;
   EXPECT_THROW(check(settings), Error);
 }
 

@@ -149,8 +149,9 @@ TEST(Settings, CheckRefusesWhatMakesNoSense) {
   expect_contains(refusal([](Settings& s) {
                     s.direct.hierarchy = Hierarchy::kSaoh;
                     s.direct.selection = Selection::kCut;
+                    s.direct.split = 0.5f;
                   }),
-                  "cuts the perfect tree only");
+                  "does not combine with cuts");
   expect_contains(refusal([](Settings& s) { s.width = s.height = 65536; }), "too large");
   expect_contains(refusal([](Settings& s) { s.pixel_bounds = {{0, 9, 0, 721}}; }), "pixel_bounds");
   expect_contains(refusal([](Settings& s) { s.pixel_bounds = {{4, 4, 0, 7}}; }), "pixel_bounds");

@@ -355,6 +355,9 @@ std::vector<NamedValues> tree_selections() {
           {"saoh", {{"hierarchy", "saoh"}, {"weights", "saoh"}}, 120},
           {"agglomerative, split", {{"hierarchy", "agglomerative"}, {"weights", "min-max"}, {"split", "0.8"}}, 30},
           {"cut", {{"hierarchy", "perfect"}, {"weights", "min-max"}, {"selection", "cut"}, {"spp", "8"}}, 30},
+          {"cut of a BVH",
+           {{"hierarchy", "saoh"}, {"weights", "saoh"}, {"selection", "cut"}, {"spp", "8"}},
+           30},
           {"interleaved cut",
            {{"hierarchy", "perfect"}, {"weights", "min-max"}, {"selection", "cut"}, {"spp", "8"}, {"cut_interleave", "2"}},
            80}};
@@ -532,7 +535,7 @@ TEST(FrameVplTree, SenselessCombinationsAreRefusedInOneSentence) {
   expect_says(refusal({{"indirect.hierarchy", "saoh"}, {"indirect.weights", "in-box"}}), {"use 'min-max' or 'yuksel' or 'saoh'"});
   expect_says(refusal({{"indirect.weights", "saoh"}}),
               {"needs indirect.hierarchy 'saoh' or 'agglomerative'", "'distance-bounded' or 'in-box' or 'yuksel'"});
-  expect_says(refusal({{"indirect.selection", "cut"}}), {"indirect.selection 'cut' cuts the perfect tree only"});
+  expect_says(refusal({{"indirect.selection", "cut"}}), {"indirect.selection 'cut' cuts light trees", "use 'perfect'"});
   expect_says(refusal({{"indirect.selection", "cut"}, {"indirect.hierarchy", "none"}}), {"use 'perfect'"});
   expect_says(refusal({{"indirect.split", "0.5"}}), {"indirect.split needs"});
   expect_says(refusal({{"indirect.hierarchy", "perfect"}, {"indirect.weights", "min-max"}, {"indirect.correction", "0.5"}}),

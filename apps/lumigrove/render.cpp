@@ -101,9 +101,10 @@ void render_tasks(const RenderOptions& options, const Scene& scene, std::vector<
     ProgressPrinter progress(style, static_cast<int>(tasks.size()));
     Receipt receipt = make_receipt(scene, options.scene->full_name());
     receipt.environment = options.scene->environment;
+    History history;
     for (Task& task : tasks) {
       apply_view_options(*options.view, scene, task.settings);
-      const Image image = render_frame(scene, task.settings, receipt, progress, guard);
+      const Image image = render_frame(scene, task.settings, receipt, progress, guard, &history);
       progress.end_line();
       write_files(image, task.files, options.output->tone(), receipt, options.log->quiet);
       accumulate(total, receipt.stats);

@@ -21,14 +21,15 @@ Scene open_scene(const std::string& name, const std::string& environment) {
 }
 
 Image render_frame(const Scene& scene, const Settings& settings, Receipt& receipt, ProgressPrinter& progress,
-                   const InterruptGuard& guard) {
+                   const InterruptGuard& guard, History* history) {
   spdlog::debug("settings:\n{}", to_toml(settings));
   progress.begin_frame(settings.frame);
   RenderStats stats;
-  Image image = render(scene, settings, &stats, [&](const Progress& now) {
+  const auto report = [&](const Progress& now) {
     progress.update(now);
     return !guard.interrupted();
-  });
+  };
+  Image image = render(scene, settings, &stats, report, history);
   complete_receipt(receipt, settings, stats);
   write_receipt(receipt, image.metadata);
   return image;

@@ -15,9 +15,9 @@ namespace lumigrove {
 Scene open_scene(const std::string& name, const std::string& environment);
 
 // Renders one frame; a signal caught by `guard` ends it after the samples that are finished. The image
-// carries the receipt, which is completed.
+// carries the receipt, which is completed. `history`: of the frames of a sequence.
 Image render_frame(const Scene& scene, const Settings& settings, Receipt& receipt, ProgressPrinter& progress,
-                   const InterruptGuard& guard);
+                   const InterruptGuard& guard, History* history = nullptr);
 
 // Writes the image to every file and says so on stdout unless `quiet`.
 void write_files(const Image& image, const std::vector<std::string>& files, const ToneMap& tone,

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -42,10 +43,27 @@ struct Progress {
 // Called after every camera sample; return false to stop early with a valid image.
 using ProgressFunction = std::function<bool(const Progress&)>;
 
+// What one frame leaves to the next: structures over lights that only the motion of instances would not change. One
+// object for all frames of a scene saves the time to build them; pictures are the same to the bit without it. It may
+// meet any scene and settings at any time: what was made from others, or from a scene since changed, is made anew.
+class History {
+ public:
+  struct Kept;
+  History();
+  ~History();
+  History(History&&) noexcept;
+  History& operator=(History&&) noexcept;
+
+  Kept& kept();  // for render()
+
+ private:
+  std::unique_ptr<Kept> kept_;
+};
+
 // Layers: beauty RGBA; direct, indirect, emission, albedo (RGB); N, P (XYZ); Z; variance (RGB, of the pixel mean,
 // when spp >= 2); emitter and instance ids of the first hit. Throws Error. Deterministic for any thread count.
 Image render(const Scene& scene, const Settings& settings, RenderStats* stats = nullptr,
-             const ProgressFunction& progress = {});
+             const ProgressFunction& progress = {}, History* history = nullptr);
 
 const char* version();  // "0.1.0"
 const char* commit();   // of the source tree, "-dirty" when changed; empty when built outside a repository

@@ -192,7 +192,7 @@ constexpr float kSubstituteOffset = 2.2e-3f;
 constexpr float kInsideDistance = 0.2155f;
 
 bool uses_bvh(const SelectionSettings& s) {
-  return s.selection == Selection::kRoot &&
+  return (s.selection == Selection::kRoot || s.selection == Selection::kCut) &&
          (s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative);
 }
 
@@ -259,6 +259,7 @@ void set_vpl_structure(RenderStats& stats, const std::string& kind, StructureSta
 // How samples of the lights are taken: of `tree`, `bvh` or the table that the sampler has.
 void set_selection(const SelectionSettings& settings, const Settings& frame, int sample, DirectLighting& lighting) {
   LightSampler& sampler = lighting.sampler;
+  const bool bvh = uses_bvh(settings);
   switch (settings.selection) {
     case Selection::kUniform:
       sampler.choice = LightChoice::kUniform;
@@ -267,15 +268,16 @@ void set_selection(const SelectionSettings& settings, const Settings& frame, int
       sampler.choice = LightChoice::kPower;
       break;
     case Selection::kRoot:
-      sampler.choice = uses_bvh(settings) ? LightChoice::kBvh : LightChoice::kTree;
-      lighting.use_split = uses_bvh(settings) && settings.split > 0;
+      sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
+      lighting.use_split = bvh && settings.split > 0;
       lighting.split = {settings.split, settings.split_cap};
       break;
     case Selection::kCut: {
-      sampler.choice = LightChoice::kTree;
+      sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
       lighting.use_cuts = true;
       const float floor = settings.cut_floor * sampler.lights.bounds.diagonal();
-      lighting.cut = {settings.spp, std::max(floor * floor, sampler.tree.floor2), settings.cut_bound};
+      const float floor2 = bvh ? sampler.bvh.floor2 : sampler.tree.floor2;
+      lighting.cut = {settings.spp, std::max(floor * floor, floor2), settings.cut_bound};
       lighting.lookup.share = settings.cut_share;
       lighting.lookup.interleave = settings.cut_interleave;
       lighting.lookup.frame = static_cast<std::uint32_t>(frame.frame) + static_cast<std::uint32_t>(sample);
@@ -307,7 +309,10 @@ DirectLighting make_vpl_light_tree_lighting(const World& world, const Settings& 
 
 // --- the world ---------------------------------------------------------------------------------------------
 
-std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats) {
+std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats,
+                                  History::Kept* kept) {
+  History::Kept known;
+  if (kept) known = take_kept(*kept, scene, settings);
   SceneState state = evaluate(scene, settings.time);
   SceneArrays arrays(scene);
   arrays.set_state(state);
@@ -315,13 +320,20 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   Tracer tracer(scene, state);
   stats.structures.push_back(
       {kAccelerationStructure, watch.ms(), tracer.bytes(), state.instances.size()});
-  LightSet lights(scene, arrays);
+  LightSet lights = known.lights ? std::move(*known.lights) : LightSet(scene, arrays);
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
-      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, {}, {}, {}, std::move(camera), {}, {},
-      {}, {}, {}, {}});
+      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, std::move(known.two_level), {}, {},
+      std::move(camera), known.texture_key, known.shape_key, {}, {}, {}, {}, {}, {}});
   build_lights(*world, settings, stats);
   return world;
+}
+
+void keep(World&& world, History::Kept& kept) {
+  kept.texture_key = world.texture_key;
+  kept.shape_key = world.shape_key;
+  kept.lights.emplace(std::move(world.lights));
+  kept.two_level = std::move(world.two_level);
 }
 
 void build_lights(World& world, const Settings& settings, RenderStats& stats) {
@@ -519,8 +531,8 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "film", sum.film_ms, 0);
 }
 
-Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
-             const ProgressFunction& progress) {
+Image render(const Scene& scene, const Settings& settings, RenderStats* stats, const ProgressFunction& progress,
+             History* history) {
   check(settings);
   RenderStats local;
   RenderStats& result = stats ? *stats : local;
@@ -531,7 +543,8 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
   tbb::task_arena arena(threads);
   return arena.execute([&] {
     const Stopwatch watch;
-    const std::unique_ptr<World> world = make_world(scene, settings, result);
+    History::Kept* const kept = history ? &history->kept() : nullptr;
+    const std::unique_ptr<World> world = make_world(scene, settings, result, kept);
     Film film(settings.width, settings.height,
               settings.indirect.show && settings.indirect.transport == Transport::kVpl);
     for (int sample = 0; sample < settings.spp; ++sample) {
@@ -540,6 +553,7 @@ Image render(const Scene& scene, const Settings& settings, RenderStats* stats,
       result.spp_done = sample + 1;
       if (progress && !progress({result.spp_done, settings.spp, watch.ms() * 1e-3})) break;
     }
+    if (kept) keep(std::move(*world), *kept);
     result.total_ms = watch.ms();
     return develop(film, result.spp_done);
   });

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "frame/film.h"
+#include "frame/history.h"
 #include "lights/alias_table.h"
 #include "lights/light_set.h"
 #include "lights/vpl_light_set.h"
@@ -23,7 +24,7 @@
 namespace lumigrove {
 
 // Everything that one moment of a scene needs before the first ray: made anew for every frame of an
-// animation.
+// animation, but for what a History keeps.
 struct World {
   SceneState state;
   SceneArrays arrays;
@@ -31,10 +32,11 @@ struct World {
   LightSet lights;
   // Over the emitters, or with indirect.joint over these and the virtual point lights:
   LightTree tree;          // built when direct.hierarchy is perfect and direct.selection is root or cut
-  TwoLevelTree two_level;  // built when direct.hierarchy is two-level and direct.selection is root
-  LightBvh bvh;            // built when direct.hierarchy is saoh or agglomerative and direct.selection is root
+  TwoLevelTree two_level;  // built when direct.hierarchy is two-level and direct.selection is root or cut
+  LightBvh bvh;            // built when direct.hierarchy is saoh or agglomerative and direct.selection is root or cut
   AliasTable alias;        // built when direct.selection is power
   CameraInstance camera;
+  std::uint64_t texture_key = 0, shape_key = 0;  // of what is kept
   // When indirect.transport is vpl:
   VplSet vpls;
   VplLightSet vpl_lights;      // gathered when a light tree is over them, or with indirect.joint behind `lights`
@@ -47,8 +49,11 @@ struct World {
 
 // The scene at settings.time: transforms, acceleration structure, emitters, hierarchy, camera. `scene` must
 // outlive it. Adds a line per structure to `stats`. Throws Error for an unknown camera or a scene without a
-// place to stand.
-std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats);
+// place to stand. With `kept`, structures are taken from there where they fit.
+std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats,
+                                  History::Kept* kept = nullptr);
+// Gives back to `kept` what later frames can use.
+void keep(World&& world, History::Kept& kept);
 
 // Emitters and their hierarchy alone, as every frame rebuilds them; with indirect.joint the hierarchy waits for the virtual
 // point lights.

@@ -462,11 +462,10 @@ void check_hierarchy(const std::string& prefix, const SelectionSettings& s) {
 
 void check_cuts(const std::string& prefix, const SelectionSettings& s) {
   if (s.selection != Selection::kCut) return;
-  if (s.hierarchy == Hierarchy::kTwoLevel)
-    throw Error(fmt::format("{0}.selection 'cut' cuts one tree, but {0}.hierarchy is 'two-level'; use 'perfect'", prefix));
-  if (s.hierarchy != Hierarchy::kPerfect)
-    throw Error(fmt::format(
-        "{0}.selection 'cut' cuts the perfect tree only; set {0}.hierarchy 'perfect' or {0}.selection 'root'", prefix));
+  if (s.hierarchy == Hierarchy::kSubstitute)
+    throw Error(fmt::format("{0}.selection 'cut' cuts light trees, but {0}.hierarchy is 'substitute'; use 'perfect', 'saoh' "
+                            "or 'agglomerative'",
+                            prefix));
   if (s.spp > kMaxCut)
     throw Error(fmt::format("a cut has at most {} nodes, but {}.spp is {}", kMaxCut, prefix, s.spp));
 }
@@ -500,13 +499,16 @@ void check_selection(const std::string& prefix, const Settings& all, const Selec
   if (s.split > 0 && !is_bvh(s.hierarchy))
     throw Error(
         fmt::format("{0}.split needs {0}.hierarchy 'saoh' or 'agglomerative'; for others use 0", prefix));
+  if (s.split > 0 && s.selection == Selection::kCut)
+    throw Error(fmt::format("{0}.split does not combine with cuts; set {0}.split 0 or {0}.selection 'root'", prefix));
 }
 
 void check_joint(const Settings& s) {
   if (s.indirect.transport != Transport::kVpl)
     throw Error(fmt::format("indirect.joint puts VPLs among the lights, but indirect.transport is '{}'; use 'vpl'",
                             get_value(s, "indirect.transport")));
-  if (s.direct.hierarchy == Hierarchy::kTwoLevel && s.direct.selection == Selection::kRoot)
+  const bool walks = s.direct.selection == Selection::kRoot || s.direct.selection == Selection::kCut;
+  if (s.direct.hierarchy == Hierarchy::kTwoLevel && walks)
     throw Error("indirect.joint needs one tree over all lights, but direct.hierarchy is 'two-level'; use 'perfect', 'saoh' "
                 "or 'agglomerative'");
 }

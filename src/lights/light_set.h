@@ -114,7 +114,7 @@ class LightSet {
  private:
   void build_environment(const SceneArrays& arrays);
 
-  const Environment environment_;
+  Environment environment_;
   std::vector<MeshEmission> meshes_;
   LargeArray<Emitter> emitters_;
   std::vector<EmissiveInstance> instances_;

@@ -60,6 +60,12 @@ struct alignas(32) LightBvhNode {
 // Entry 2 node + lane is the child `lane` of a node; entry 0 is the whole tree.
 inline constexpr std::uint32_t kBvhRoot = 0;
 
+// An entry as a range of one child, as perfect trees have them, and back.
+LUMI_HD inline Subtree subtree_of_entry(std::uint32_t entry) {
+  return {entry / 2, 0, static_cast<std::uint8_t>(entry % 2), 1};
+}
+LUMI_HD inline std::uint32_t entry_of_subtree(Subtree subtree) { return 2 * subtree.node + subtree.first; }
+
 struct LightBvhView {
   const LightBvhNode* nodes = nullptr;             // the first stands above the root, its only child
   const std::uint32_t* emitter_leaves = nullptr;  // emitter -> number of its leaf, kNoEmitter if none

@@ -55,7 +55,7 @@ void add_cut_samples(const DirectLighting& lighting, std::span<const Surface> su
     const ScopedTimer timer(buffers.cut_ms);
     buffers.cuts.resize(static_cast<std::size_t>(lookup.blocks()));
     launch(lookup.blocks(),
-           CutKernel{lighting.sampler.tree, lighting.cut, lookup, lighting.rng, surfaces, buffers.cuts});
+           CutKernel{lighting.sampler, lighting.cut, lookup, lighting.rng, surfaces, buffers.cuts});
   }
   const int passes = lookup.passes(lighting.cut.size);
   CutSamples samples = samples_below(buffers.cuts, lookup);

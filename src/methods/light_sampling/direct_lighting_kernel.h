@@ -41,7 +41,7 @@ LUMI_HD inline float pdf_below_cut(const LightSampler& sampler, const CutSamples
   const LightCut& cut = samples.cut_of(pixel_of_index(samples.lookup.window, static_cast<int>(i)));
   float pdf = 0;
   for (int k = 0; k < cut.count; ++k)
-    pdf += pdf_tree(sampler.tree, cut.nodes[k], surface.position, surface.normal, emitter);
+    pdf += pdf_emitter_below(sampler, cut.nodes[k], surface.position, surface.normal, emitter);
   return group_probabilities(sampler, surface).local * pdf / samples.scale;
 }
 
@@ -117,9 +117,15 @@ struct DirectLightKernel {
     std::uint32_t entry = kBvhRoot;
   };
 
-  // Without splitting, any light. Otherwise one below this pass's entry, or in the pass behind the last entry one of the
-  // lights at infinity.
+  // Without cuts and splitting, any light. With cuts, one below this pass's node or at infinity. With splitting, one
+  // below this pass's entry, or in the pass behind the last entry one of the lights at infinity.
   LUMI_HD BvhStart start_of_bvh_walk(std::size_t i, float r) const {
+    if (!cuts.cuts.empty()) {
+      const ChosenGroup group = choose_group(sampler, surfaces[i], r);
+      if (group.group != LightGroup::kLocal) return {group};
+      const TreeStart start = node_of_cut(i);
+      return start.subtree.children == 0 ? BvhStart{} : BvhStart{group, entry_of_subtree(start.subtree)};
+    }
     if (split.counts.empty()) return {choose_group(sampler, surfaces[i], r)};
     const int count = split.counts[i];
     if (split.pass == count) return {choose_group_at_infinity(sampler, surfaces[i], r)};
@@ -151,7 +157,7 @@ struct DirectLightKernel {
     walk_together(index, walks, size);
     TreeSample chosen[kWalkBatch];
     for (int k = 0; k < size; ++k) chosen[k] = end_of_walk(walks[k]);
-    finish(index, groups, numbers, chosen, size, scale);
+    finish(index, groups, numbers, chosen, size, cuts.cuts.empty() ? scale : cuts.scale);
   }
 
   // A step of each in turn, so that one's arithmetic goes on while another waits.
@@ -172,19 +178,18 @@ struct DirectLightKernel {
   }
 
   // Where the walk of a surface starts; without children where this pass has no node for its pixel.
-  LUMI_HD Subtree start_of(std::size_t i) const {
-    if (cuts.cuts.empty()) return whole_tree(sampler.tree);
+  LUMI_HD TreeStart node_of_cut(std::size_t i) const {
     const Pixel pixel = pixel_of_index(cuts.lookup.window, static_cast<int>(i));
     const LightCut& cut = cuts.cut_of(pixel);
     const CutEntries entries = entries_of_pixel(cuts.lookup, pixel, cut.count);
     const int entry = entries.first + cuts.pass;
-    return entry < entries.end ? cut.nodes[entry] : Subtree{};
+    return entry < entries.end ? cut.nodes[entry] : TreeStart{};
   }
 
   LUMI_HD void light_by_walks(std::size_t first, int count) const {
     ChosenGroup groups[kWalkBatch];
     vec2 walk_numbers[kWalkBatch], numbers[kWalkBatch];
-    Subtree starts[kWalkBatch];
+    TreeStart starts[kWalkBatch];
     std::uint32_t index[kWalkBatch];
     int walks = 0;
     for (int k = 0; k < count; ++k) {
@@ -197,8 +202,8 @@ struct DirectLightKernel {
         write(i, light_in_group(sampler, surface, group, {}, vec2(u.y, u.z)), scale);
         continue;
       }
-      starts[walks] = start_of(i);
-      if (starts[walks].children == 0) continue;
+      starts[walks] = cuts.cuts.empty() ? TreeStart{whole_tree(sampler.tree)} : node_of_cut(i);
+      if (starts[walks].subtree.children == 0) continue;
       groups[walks] = group;
       walk_numbers[walks] = vec2(group.r, u.w);
       numbers[walks] = vec2(u.y, u.z);
@@ -272,7 +277,7 @@ struct DirectLightKernel {
   }
 
   // Walks that start at one place go together: all of them without cuts, and those of a block that shares one.
-  LUMI_HD void walk_from_starts(const Subtree* starts, const std::uint32_t* index, const vec2* numbers,
+  LUMI_HD void walk_from_starts(const TreeStart* starts, const std::uint32_t* index, const vec2* numbers,
                                 int count, TreeSample* chosen) const {
     bool done[kWalkBatch] = {};
     for (int leader = 0; leader < count; ++leader) {

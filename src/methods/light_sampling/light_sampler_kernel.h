@@ -89,9 +89,13 @@ LUMI_HD inline void sample_trees(const LightTreeView& tree, Subtree start, const
 }
 
 // Emitters below `start`, through the trees of meshes where there are any.
-LUMI_HD inline void sample_emitters(const LightSampler& sampler, Subtree start, const WalkPoints& points, int count,
-                                    TreeSample* samples) {
-  sample_trees(sampler.tree, start, points, count, samples);
+LUMI_HD inline void sample_emitters(const LightSampler& sampler, const TreeStart& start, const WalkPoints& points,
+                                    int count, TreeSample* samples) {
+  if (start.instance != kNoId) {
+    sample_one_mesh(sampler.mesh_trees, start, points, count, samples);
+    return;
+  }
+  sample_trees(sampler.tree, start.subtree, points, count, samples);
   if (sampler.mesh_trees.present()) sample_mesh_trees(sampler.mesh_trees, points, count, samples);
 }
 
@@ -108,11 +112,21 @@ LUMI_HD inline float pdf_tree(const LightTreeView& tree, Subtree start, vec3 x, 
   return with_width(tree.width, [&](auto w) { return pdf_light_tree<w>(tree, start, x, n, emitter); });
 }
 
-LUMI_HD inline float pdf_two_level_tree(const LightSampler& sampler, vec3 x, vec3 n, std::uint32_t emitter) {
+LUMI_HD inline float pdf_two_level_tree(const LightSampler& sampler, const TreeStart& start, vec3 x, vec3 n,
+                                        std::uint32_t emitter) {
   if (sampler.tree.count == 0) return 0;
   return with_width(sampler.tree.width, [&](auto w) {
-    return pdf_mesh_trees<w>(sampler.tree, sampler.mesh_trees, sampler.lights, x, n, emitter);
+    return pdf_mesh_trees<w>(sampler.tree, sampler.mesh_trees, sampler.lights, start, x, n, emitter);
   });
+}
+
+// Probability with which walks from `start` return `emitter`; 0 if it is not below. kTree and kBvh.
+LUMI_HD inline float pdf_emitter_below(const LightSampler& sampler, const TreeStart& start, vec3 x, vec3 n,
+                                       std::uint32_t emitter) {
+  if (sampler.choice == LightChoice::kBvh)
+    return pdf_light_bvh(sampler.bvh, entry_of_subtree(start.subtree), x, n, emitter);
+  if (sampler.mesh_trees.present()) return pdf_two_level_tree(sampler, start, x, n, emitter);
+  return pdf_tree(sampler.tree, start.subtree, x, n, emitter);
 }
 
 // One local emitter; pdf 0 when there is none to choose. u.x, u.y are used up.
@@ -131,7 +145,7 @@ LUMI_HD inline TreeSample choose_emitter(const LightSampler& sampler, const Surf
       WalkPoints points;
       points.set(0, surface.position, surface.normal, u);
       TreeSample sample;
-      sample_emitters(sampler, whole_tree(sampler.tree), points, 1, &sample);
+      sample_emitters(sampler, {whole_tree(sampler.tree)}, points, 1, &sample);
       return sample;
     }
     case LightChoice::kBvh:
@@ -151,9 +165,7 @@ LUMI_HD inline float pdf_choose_emitter(const LightSampler& sampler, const Surfa
     case LightChoice::kPower:
       return sampler.alias.pdf(emitter_flux(sampler.lights, emitter));
     case LightChoice::kTree:
-      if (sampler.mesh_trees.present())
-        return pdf_two_level_tree(sampler, surface.position, surface.normal, emitter);
-      return pdf_tree(sampler.tree, whole_tree(sampler.tree), surface.position, surface.normal, emitter);
+      return pdf_emitter_below(sampler, {whole_tree(sampler.tree)}, surface.position, surface.normal, emitter);
     case LightChoice::kBvh:
       return pdf_light_bvh(sampler.bvh, kBvhRoot, surface.position, surface.normal, emitter);
     case LightChoice::kOne:

@@ -130,18 +130,19 @@ void TwoLevelTree::build_top(const SceneView& scene, const LightView& lights) {
   }
   const std::size_t count = sources_.size() + lights.punctual.size();
   instances_.resize(count);
+  placements_.resize(count);
   boxes_.resize(count);
   const auto first_punctual = static_cast<std::uint32_t>(lights.emitters.size() - lights.punctual.size());
-  launch(static_cast<int>(count),
-         TreeInstanceKernel{scene, lights, summaries_.data(), sources_, first_punctual, options_.cones,
-                            instances_, boxes_},
-         256);
   const float inverse_flux = lights.local_flux > 0 ? 1 / std::min(lights.local_flux, 1e37f) : 0;
+  launch(static_cast<int>(count),
+         TreeInstanceKernel{scene, lights, summaries_.data(), sources_, first_punctual, inverse_flux, options_.cones,
+                            instances_, placements_, boxes_},
+         256);
   top_.build(BoxLeaves{boxes_, inverse_flux}, lights.bounds, lights.diagonal, options_);
 }
 
 MeshTreesView TwoLevelTree::view() const {
-  return {instances_.data(), tree_views_.data(), instance_numbers_.data(),
+  return {instances_.data(), placements_.data(), tree_views_.data(), instance_numbers_.data(),
           static_cast<std::uint32_t>(sources_.size()), options_.width, options_.weights};
 }
 
@@ -152,7 +153,7 @@ std::size_t TwoLevelTree::mesh_bytes() const {
 }
 
 std::size_t TwoLevelTree::bytes() const {
-  return mesh_bytes() + top_.bytes() + instances_.size() * sizeof(TreeInstance) +
+  return mesh_bytes() + top_.bytes() + instances_.size() * (sizeof(TreeInstance) + sizeof(MeshPlacement)) +
          instance_numbers_.size() * sizeof(std::uint32_t);
 }
 

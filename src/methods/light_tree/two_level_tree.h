@@ -40,6 +40,7 @@ class TwoLevelTree {
   std::vector<MeshSummary> summaries_;
   std::vector<std::uint32_t> sources_, instance_numbers_;
   LargeArray<TreeInstance> instances_;
+  LargeArray<MeshPlacement> placements_;
   LargeArray<NodeChild> boxes_;
   double build_ms_ = 0, mesh_ms_ = 0;
   int meshes_built_ = 0;

@@ -95,8 +95,10 @@ struct TreeInstanceKernel {
   const MeshSummary* meshes;
   std::span<const std::uint32_t> sources;
   std::uint32_t first_punctual;  // emitter
+  float inverse_flux;            // of all local lights
   bool use_cones;
   std::span<TreeInstance> instances;
+  std::span<MeshPlacement> placements;
   std::span<NodeChild> boxes;
 
   LUMI_HD void operator()(int i) const {
@@ -139,6 +141,8 @@ struct TreeInstanceKernel {
     if (instance.cones) box.cone = instance_cone(mesh, linear, shown.normal_to_world);
     instances[number] = instance;
     boxes[number] = box;
+    placements[number] = {linear, instance.origin, finite_or_zero(box.intensity * inverse_flux),
+                          instance.cones && keeps_shapes(linear) ? 1 / glm::length(linear[0]) : 0.0f};
   }
 
   // Root of the mean square of |C n| over the mesh's normals: exact for one plane, and where L keeps shapes.

@@ -21,14 +21,17 @@
 //             A mesh of one triangle needs no second walk. Triangles of no area in their mesh do not shine.
 // Estimator   unbiased: every emitter that can contribute at x has positive probability, and the probability
 //             returned is exactly the product of the steps taken.
-// In -> Out   points and normals in the world and walks down the top level -> emitters and probabilities.
+// In -> Out   points and normals in the world and walks down the top level -> emitters and probabilities. Walks may
+//             also start inside the tree of one instance's mesh, and then know nothing of the others.
 // Oracle      tests/two_level_tree_test.cpp: sum and chi-square of pdf_mesh_trees, mean against the exhaustive sum
-//             with turned, scaled, mirrored, stretched, sheared and flattened instances.
+//             with turned, scaled, mirrored, stretched, sheared and flattened instances. tests/lightcuts_test.cpp for
+//             walks from inside a mesh.
 #pragma once
 
 #include "base/rng.h"
 #include "lights/emitter.h"
 #include "methods/light_tree/light_tree_kernel.h"
+#include "trace/ray.h"
 
 namespace lumigrove {
 
@@ -46,9 +49,18 @@ struct alignas(64) TreeInstance {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 };
 
+// Where an instance shows its mesh: y = to_world y' + origin. What cuts need beside TreeInstance.
+struct MeshPlacement {
+  mat3 to_world = mat3(1);  // L
+  vec3 origin = vec3(0);    // t
+  float intensity = 1;      // share of all local flux that is 1 in the mesh's tree
+  float to_normal = 0;      // 1/s if L keeps shapes: normals then are L n' / s; elsewhere 0
+};
+
 // The bottom level. Not present: leaves of the tree are emitters themselves.
 struct MeshTreesView {
   const TreeInstance* instances = nullptr;          // by leaf number of the top level
+  const MeshPlacement* placements = nullptr;        // likewise
   const LightTreeView* trees = nullptr;             // by mesh
   const std::uint32_t* instance_numbers = nullptr;  // instance of the scene -> its number in `instances`
   std::uint32_t punctual_first = 0;                 // number of the first point or spot light
@@ -56,6 +68,15 @@ struct MeshTreesView {
   Weights weights = Weights::kMinMax;
 
   LUMI_HD bool present() const { return instances != nullptr; }
+};
+
+// Where a walk starts: in the tree over all lights, which may be the top level, or in the tree of an instance's mesh.
+// Light BVHs: children of a node likewise, always one.
+struct TreeStart {
+  Subtree subtree;
+  std::uint32_t instance = kNoId;  // number in MeshTreesView::instances
+
+  LUMI_HD bool operator==(const TreeStart& o) const { return subtree == o.subtree && instance == o.instance; }
 };
 
 struct MeshSpacePoint {
@@ -159,10 +180,40 @@ LUMI_HD inline void sample_mesh_trees(const MeshTreesView& below, const WalkPoin
   });
 }
 
+// The tree of an instance's mesh, with cones where the instance may use them.
+LUMI_HD inline LightTreeView tree_of_instance(const MeshTreesView& below, const TreeInstance& instance) {
+  LightTreeView tree = below.trees[instance.tree];
+  if (!instance.cones) tree.first_cones = tree.levels;
+  return tree;
+}
+
+// Emitters below a start in the mesh of one instance: all walks are in one tree.
+LUMI_HD inline void sample_one_mesh(const MeshTreesView& below, const TreeStart& start, const WalkPoints& points,
+                                    int count, TreeSample* samples) {
+  const TreeInstance& instance = below.instances[start.instance];
+  const LightTreeView tree = tree_of_instance(below, instance);
+  WalkPoints local;
+  for (int i = 0; i < count; ++i) {
+    const MeshSpacePoint point = to_mesh_space(instance, points.position(i), points.normal(i));
+    local.set(i, point.position, point.normal, vec2(points.u0[i], points.u1[i]));
+  }
+  with_width(below.width, [&](auto w) { sample_light_tree<w>(tree, start.subtree, local, count, samples); });
+  for (int i = 0; i < count; ++i)
+    if (samples[i].pdf > 0) samples[i].emitter += instance.first;
+}
+
 // Number in MeshTreesView::instances of the leaf that holds an emitter.
 LUMI_HD inline std::uint32_t instance_of_emitter(const MeshTreesView& below, const Emitter& emitter) {
   return emitter.punctual() ? below.punctual_first + emitter.index()
                             : below.instance_numbers[emitter.source];
+}
+
+// Probability of `emitter` below `start`, in the tree of its instance's mesh.
+template <int W>
+LUMI_HD inline float pdf_in_tree(const LightTreeView& tree, Subtree start, const TreeInstance& instance, vec3 x, vec3 n,
+                                 std::uint32_t emitter) {
+  const MeshSpacePoint local = to_mesh_space(instance, x, n);
+  return pdf_light_tree<W>(tree, start, local.position, local.normal, emitter - instance.first);
 }
 
 // Probability of `emitter`, given its instance: the product of sample_mesh_trees' steps.
@@ -170,20 +221,23 @@ template <int W>
 LUMI_HD inline float pdf_in_mesh(const MeshTreesView& below, const TreeInstance& instance, vec3 x, vec3 n,
                                  std::uint32_t emitter) {
   if (instance.tree == TreeInstance::kNone) return instance.first == emitter ? 1.0f : 0.0f;
-  LightTreeView tree = below.trees[instance.tree];
-  if (!instance.cones) tree.first_cones = tree.levels;
-  const MeshSpacePoint local = to_mesh_space(instance, x, n);
-  return pdf_light_tree<W>(tree, whole_tree(tree), local.position, local.normal, emitter - instance.first);
+  const LightTreeView tree = tree_of_instance(below, instance);
+  return pdf_in_tree<W>(tree, whole_tree(tree), instance, x, n, emitter);
 }
 
-// Probability with which walks from the top level's root return `emitter`.
+// Probability with which walks from `start` return `emitter`.
 template <int W>
-LUMI_HD inline float pdf_mesh_trees(const LightTreeView& top, const MeshTreesView& below,
-                                    const LightView& lights, vec3 x, vec3 n, std::uint32_t emitter) {
+LUMI_HD inline float pdf_mesh_trees(const LightTreeView& top, const MeshTreesView& below, const LightView& lights,
+                                    const TreeStart& start, vec3 x, vec3 n, std::uint32_t emitter) {
   const std::uint32_t number = instance_of_emitter(below, lights.emitters[emitter]);
   if (number == kNoEmitter) return 0;
-  const float of_instance = pdf_light_tree<W>(top, whole_tree(top), x, n, number);
-  return of_instance > 0 ? of_instance * pdf_in_mesh<W>(below, below.instances[number], x, n, emitter) : 0.0f;
+  const TreeInstance& instance = below.instances[number];
+  if (start.instance != kNoId) {
+    if (start.instance != number) return 0;
+    return pdf_in_tree<W>(tree_of_instance(below, instance), start.subtree, instance, x, n, emitter);
+  }
+  const float of_instance = pdf_light_tree<W>(top, start.subtree, x, n, number);
+  return of_instance > 0 ? of_instance * pdf_in_mesh<W>(below, instance, x, n, emitter) : 0.0f;
 }
 
 }  // namespace lumigrove

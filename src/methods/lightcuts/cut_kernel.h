@@ -15,15 +15,20 @@
 //             By default a node's error is the sum of the bounds of the children of the wide node that it belongs to, with
 //             their own boxes and cones (CutBound::kChildren): tighter than the bound over one box around all of them,
 //             which is largest wherever that box holds the point. The others are the paper's and the code's.
+//             In the two-level tree a leaf of the top level is the tree of its mesh. Errors there are of boxes around
+//             the mesh's boxes in the world, as shares of all local flux, so that those of both levels compare under
+//             any map from the mesh to the world; cones count where the map keeps shapes.
+//             Light BVHs are cut by the same errors, whatever their walks' weights are.
 //             Pixels without a surface pass the choice of the representative on to the next one.
 // Estimator   unbiased: a cut is a partition of all lights, whatever pixel it was chosen for, and one light is sampled
 //             below each node. Interleaved, unbiased as the mean over m^2 frames.
 // In -> Out   surfaces of a tile -> a LightCut for every block of k x k pixels
-// Oracle      tests/lightcuts_test.cpp: partition of the lights, greedy choice against a plain one, exhaustive sum.
+// Oracle      tests/lightcuts_test.cpp, tests/tree_cuts_test.cpp: partition of the lights, greedy choice against a plain
+//             one, exhaustive sum.
 #pragma once
 
 #include "lumigrove/settings.h"
-#include "methods/light_tree/light_tree_kernel.h"
+#include "methods/light_sampling/light_sampler_kernel.h"
 #include "scene/camera_kernel.h"
 #include "scene/surface.h"
 #include "trace/ray.h"
@@ -38,11 +43,14 @@ struct CutOptions {
   CutBound bound = CutBound::kChildren;
 };
 
+// Partition of the lights: each node holds those that a walk from it can reach.
 struct LightCut {
-  Subtree nodes[kMaxCut];
+  TreeStart nodes[kMaxCut];
   float error[kMaxCut];
   int count = 0;
 };
+
+// --- errors ------------------------------------------------------------------------------------------------
 
 struct SubtreeBounds {
   Box3 box;
@@ -50,10 +58,9 @@ struct SubtreeBounds {
 };
 
 template <int W>
-LUMI_HD inline SubtreeBounds bounds_of(const LightTreeView& tree, Subtree subtree) {
-  const LightNode<W>& node = tree.level<W>(subtree.level)[subtree.node];
+LUMI_HD inline SubtreeBounds bounds_of(const LightNode<W>& node, int first, int children) {
   SubtreeBounds bounds;
-  for (int c = subtree.first; c < subtree.first + subtree.children; ++c) {
+  for (int c = first; c < first + children; ++c) {
     if (!(node.intensity[c] > 0)) continue;
     const vec3 centre(node.centre_x[c], node.centre_y[c], node.centre_z[c]);
     const vec3 half(node.half_x[c], node.half_y[c], node.half_z[c]);
@@ -63,25 +70,35 @@ LUMI_HD inline SubtreeBounds bounds_of(const LightTreeView& tree, Subtree subtre
   return bounds;
 }
 
-LUMI_HD inline bool is_leaf(const LightTreeView& tree, Subtree subtree) {
-  return subtree.children == 1 && subtree.level == tree.levels - 1;
+// The world's box of what an instance shows, and its share of all local flux.
+LUMI_HD inline SubtreeBounds place(const SubtreeBounds& bounds, const MeshPlacement& placement) {
+  const mat3& m = placement.to_world;
+  const vec3 middle = m * bounds.box.centre() + placement.origin;
+  const vec3 reach = mat3(glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])) * (0.5f * bounds.box.extent());
+  return {{middle - reach, middle + reach}, bounds.intensity * placement.intensity};
 }
 
-// The whole tree, as a range whose halves are binary nodes.
-LUMI_HD inline Subtree binary_root(const LightTreeView& tree) {
-  Subtree root = whole_tree(tree);
-  int children = 1;
-  while (children < tree.root_children) children *= 2;
-  root.children = static_cast<std::uint8_t>(children);
-  return root;
-}
-
-// One child of a node is that child's own children, where it has any.
+// The same for the children of a node.
 template <int W>
-LUMI_HD inline Subtree descend(const LightTreeView& tree, Subtree subtree) {
-  if (subtree.children > 1 || is_leaf(tree, subtree)) return subtree;
-  return {subtree.node * W + subtree.first, static_cast<std::int16_t>(subtree.level + 1), 0,
-          static_cast<std::uint8_t>(W)};
+LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<W> multiply(const mat3& m, const LaneVec3<W>& v) {
+  const auto row = [&](int r) {
+    return dot<W>({broadcast<W>(m[0][r]), broadcast<W>(m[1][r]), broadcast<W>(m[2][r])}, v);
+  };
+  return {row(0), row(1), row(2)};
+}
+
+template <int W>
+LUMI_HD inline BoxLanes<W> place(const BoxLanes<W>& boxes, const MeshPlacement& placement) {
+  const mat3& m = placement.to_world;
+  const LaneVec3<W> centre = multiply<W>(m, boxes.centre);
+  return {{centre.x + placement.origin.x, centre.y + placement.origin.y, centre.z + placement.origin.z},
+          multiply<W>(mat3(glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])), boxes.half),
+          boxes.intensity * placement.intensity};
+}
+
+template <int W>
+LUMI_HD inline ConeLanes<W> place(const ConeLanes<W>& cones, const MeshPlacement& placement) {
+  return {multiply<W>(placement.to_world * placement.to_normal, cones.axis), cones.radius};
 }
 
 // Height of the box's highest corner over its distance: of the point nearest to x, as the authors' code has it (never 0
@@ -114,57 +131,172 @@ LUMI_HD inline float box_error(const SubtreeBounds& bounds, vec3 x, vec3 n, cons
          glm::max(length_squared(nearest), options.floor2);
 }
 
-// Bounds of what each child of a node can send, their own boxes and cones taken for themselves.
+// Bounds of what each child of a node can send, their own boxes and cones taken for themselves. `placement`: of the
+// mesh whose tree the node is in, null in the world's.
 template <int W>
-LUMI_HD inline Lanes<W> child_errors(const LightTreeView& tree, Subtree subtree, vec3 x, vec3 n, float floor2) {
-  const LightNode<W>& node = tree.level<W>(subtree.level)[subtree.node];
-  return weigh_boxes<W>(
-             load_boxes<W>(node), subtree.level >= tree.first_cones, [&] { return load_cones<W>(node); }, floor2,
-             broadcast<W>(x), broadcast<W>(n))
+LUMI_HD inline Lanes<W> child_errors(const LightNode<W>& node, bool cones, const MeshPlacement* placement, vec3 x,
+                                     vec3 n, float floor2) {
+  BoxLanes<W> boxes = load_boxes<W>(node);
+  if (placement) boxes = place<W>(boxes, *placement);
+  const auto cones_of_node = [&] {
+    return placement ? place<W>(load_cones<W>(node), *placement) : load_cones<W>(node);
+  };
+  return weigh_boxes<W>(boxes, cones && (!placement || placement->to_normal > 0), cones_of_node, floor2,
+                        broadcast<W>(x), broadcast<W>(n))
       .near;
 }
 
 template <int W>
-LUMI_HD inline float cut_error(const LightTreeView& tree, Subtree subtree, const SubtreeBounds& bounds, vec3 x, vec3 n,
-                               const CutOptions& options) {
-  if (is_leaf(tree, subtree)) return 0;
-  if (options.bound != CutBound::kChildren) return box_error(bounds, x, n, options);
+LUMI_HD inline float sum_of_child_errors(const LightNode<W>& node, int first, int children, bool cones,
+                                         const MeshPlacement* placement, vec3 x, vec3 n, float floor2) {
   float errors[W], sum = 0;
-  store_lanes<W>(child_errors<W>(tree, subtree, x, n, options.floor2), errors);
-  for (int c = subtree.first; c < subtree.first + subtree.children; ++c) sum += errors[c];
+  store_lanes<W>(child_errors<W>(node, cones, placement, x, n, floor2), errors);
+  for (int c = first; c < first + children; ++c) sum += errors[c];
   return sum;
 }
 
-// Splits the node of the greatest error until there are n, or none has any.
+// --- trees that can be cut ---------------------------------------------------------------------------------
+// What select_cut asks of a tree, for a surface at x with normal n:
+//   bool root(TreeStart&)                  all lights; false if there are none
+//   int split(TreeStart, TreeStart[2])     the parts of a node that hold lights; of several lights only
+//   float error(TreeStart)                 0 for a single light
+
+LUMI_HD inline bool is_leaf(const LightTreeView& tree, Subtree subtree) {
+  return subtree.children == 1 && subtree.level == tree.levels - 1;
+}
+
+// The whole tree, as a range whose halves are binary nodes.
+LUMI_HD inline Subtree binary_root(const LightTreeView& tree) {
+  Subtree root = whole_tree(tree);
+  int children = 1;
+  while (children < tree.root_children) children *= 2;
+  root.children = static_cast<std::uint8_t>(children);
+  return root;
+}
+
+// The perfect tree, of one level or two.
 template <int W>
-LUMI_HD inline void select_cut(const LightTreeView& tree, vec3 x, vec3 n, const CutOptions& options, LightCut& cut) {
+struct CutOfTrees {
+  const LightTreeView& top;
+  const MeshTreesView& below;
+  const CutOptions& options;
+  vec3 x, n;
+
+  LUMI_HD const LightTreeView& tree_of(const TreeStart& start) const {
+    return start.instance == kNoId ? top : below.trees[below.instances[start.instance].tree];
+  }
+  LUMI_HD const LightNode<W>& node_of(const TreeStart& start) const {
+    return tree_of(start).template level<W>(start.subtree.level)[start.subtree.node];
+  }
+
+  // One child of a node is that child's own children, where it has any; a leaf of the top level is the tree of its
+  // mesh.
+  LUMI_HD TreeStart enter(const TreeStart& start) const {
+    const Subtree& s = start.subtree;
+    if (s.children > 1) return start;
+    const LightTreeView& tree = tree_of(start);
+    if (!is_leaf(tree, s))
+      return {{s.node * W + s.first, static_cast<std::int16_t>(s.level + 1), 0, static_cast<std::uint8_t>(W)},
+              start.instance};
+    if (start.instance != kNoId || !below.present()) return start;
+    const std::uint32_t instance = tree.leaf_emitters[s.node * W + s.first];
+    const std::uint32_t mesh = below.instances[instance].tree;
+    return mesh == TreeInstance::kNone ? start : TreeStart{binary_root(below.trees[mesh]), instance};
+  }
+
+  LUMI_HD bool root(TreeStart& start) const {
+    if (top.count == 0) return false;
+    start = enter({binary_root(top)});
+    return true;
+  }
+
+  LUMI_HD int split(const TreeStart& start, TreeStart (&parts)[2]) const {
+    const auto half = static_cast<std::uint8_t>(start.subtree.children / 2);
+    int count = 0;
+    for (int side = 0; side < 2; ++side) {
+      TreeStart part = start;
+      part.subtree.first = static_cast<std::uint8_t>(start.subtree.first + side * half);
+      part.subtree.children = half;
+      if (bounds_of<W>(node_of(part), part.subtree.first, half).intensity > 0)  // else nothing but bogus lights
+        parts[count++] = enter(part);
+    }
+    return count;
+  }
+
+  LUMI_HD float error(const TreeStart& start) const {
+    const LightTreeView& tree = tree_of(start);
+    const Subtree& s = start.subtree;
+    if (is_leaf(tree, s)) return 0;
+    const LightNode<W>& node = node_of(start);
+    const MeshPlacement* placement = start.instance == kNoId ? nullptr : &below.placements[start.instance];
+    if (options.bound == CutBound::kChildren)
+      return sum_of_child_errors<W>(node, s.first, s.children, s.level >= tree.first_cones, placement, x, n,
+                                    options.floor2);
+    const SubtreeBounds bounds = bounds_of<W>(node, s.first, s.children);
+    return box_error(placement ? place(bounds, *placement) : bounds, x, n, options);
+  }
+};
+
+struct CutOfBvh {
+  const LightBvhView& bvh;
+  const CutOptions& options;
+  vec3 x, n;
+
+  LUMI_HD bool root(TreeStart& start) const {
+    start = {subtree_of_entry(kBvhRoot)};
+    return bvh.count > 0;
+  }
+
+  LUMI_HD int split(const TreeStart& start, TreeStart (&parts)[2]) const {
+    const std::uint32_t link = bvh.link(entry_of_subtree(start.subtree));
+    parts[0] = {subtree_of_entry(2 * link)};
+    parts[1] = {subtree_of_entry(2 * link + 1)};
+    return 2;
+  }
+
+  LUMI_HD float error(const TreeStart& start) const {
+    const std::uint32_t link = bvh.link(entry_of_subtree(start.subtree));
+    if ((link & kBvhLeaf) != 0) return 0;
+    const bool cones = bvh.cones || bvh.weights == Weights::kSaoh;
+    if (options.bound == CutBound::kChildren)
+      return sum_of_child_errors<2>(bvh.nodes[link].bounds, 0, 2, cones, nullptr, x, n, options.floor2);
+    return box_error(bounds_of<2>(bvh.nodes[start.subtree.node].bounds, start.subtree.first, 1), x, n, options);
+  }
+};
+
+// --- selection ---------------------------------------------------------------------------------------------
+
+// Splits the node of the greatest error until there are n, or none has any.
+template <class Tree>
+LUMI_HD inline void select_cut(const Tree& tree, int size, LightCut& cut) {
   cut.count = 0;
-  if (tree.count == 0) return;
-  const Subtree root = descend<W>(tree, binary_root(tree));
-  cut.nodes[0] = root;
-  cut.error[0] = cut_error<W>(tree, root, bounds_of<W>(tree, root), x, n, options);
+  if (!tree.root(cut.nodes[0])) return;
+  cut.error[0] = tree.error(cut.nodes[0]);
   cut.count = 1;
-  while (cut.count < options.size) {
+  while (cut.count < size) {
     int worst = 0;
     for (int i = 1; i < cut.count; ++i)
       if (cut.error[i] > cut.error[worst]) worst = i;
     if (!(cut.error[worst] > 0)) return;
-    const Subtree split = cut.nodes[worst];
-    const auto half = static_cast<std::uint8_t>(split.children / 2);
-    int written = 0;
-    for (int side = 0; side < 2; ++side) {
-      Subtree child = split;
-      child.first = static_cast<std::uint8_t>(split.first + side * half);
-      child.children = half;
-      const SubtreeBounds bounds = bounds_of<W>(tree, child);
-      if (!(bounds.intensity > 0)) continue;  // nothing but bogus lights
-      child = descend<W>(tree, child);
-      // The first takes the place of what is split, the second is appended.
-      const int place = written++ == 0 ? worst : cut.count++;
-      cut.nodes[place] = child;
-      cut.error[place] = cut_error<W>(tree, child, bounds, x, n, options);
+    TreeStart parts[2];
+    const int count = tree.split(cut.nodes[worst], parts);
+    // The first takes the place of what is split, the second is appended.
+    for (int part = 0; part < count; ++part) {
+      const int place = part == 0 ? worst : cut.count++;
+      cut.nodes[place] = parts[part];
+      cut.error[place] = tree.error(parts[part]);
     }
   }
+}
+
+LUMI_HD inline void select_cut(const LightSampler& sampler, vec3 x, vec3 n, const CutOptions& options, LightCut& cut) {
+  if (sampler.choice == LightChoice::kBvh) {
+    select_cut(CutOfBvh{sampler.bvh, options, x, n}, options.size, cut);
+    return;
+  }
+  with_width(sampler.tree.width, [&](auto w) {
+    select_cut(CutOfTrees<w>{sampler.tree, sampler.mesh_trees, options, x, n}, options.size, cut);
+  });
 }
 
 // Which cut, and which of its nodes, a pixel samples.
@@ -199,7 +331,7 @@ LUMI_HD inline CutEntries entries_of_pixel(const CutLookup& lookup, Pixel pixel,
 
 // cuts[block]: of a random pixel of the block that shows a surface.
 struct CutKernel {
-  LightTreeView tree;
+  LightSampler sampler;
   CutOptions options;
   CutLookup lookup;
   Rng rng;
@@ -218,7 +350,7 @@ struct CutKernel {
       const Pixel pixel{pixels.x0 + at % pixels.width(), pixels.y0 + at / pixels.width()};
       const Surface& s = surfaces[static_cast<std::size_t>(index_of_pixel(lookup.window, pixel))];
       if (s.instance == kNoId) continue;
-      with_width(tree.width, [&](auto w) { select_cut<w>(tree, s.position, s.normal, options, cut); });
+      select_cut(sampler, s.position, s.normal, options, cut);
       return;
     }
   }
