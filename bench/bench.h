@@ -37,6 +37,7 @@ const std::vector<Benchmark>& benchmarks();  // registry.cpp
 Result frame_floor_night_city(const Options& options);
 Result frame_floor_cornell_lights(const Options& options);
 Result frame_floor_rtslc_cornell_lights(const Options& options);
+Result frame_floor_pool_cornell_lights(const Options& options);
 Result build_tree_1m(const Options& options);
 Result sample_scaling(const Options& options);
 Result build_two_level(const Options& options);

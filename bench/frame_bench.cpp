@@ -65,5 +65,8 @@ Result frame_floor_cornell_lights(const Options& options) {
 Result frame_floor_rtslc_cornell_lights(const Options& options) {
   return frame_over_floor("cornell-lights", "rtslc", options);
 }
+Result frame_floor_pool_cornell_lights(const Options& options) {
+  return frame_over_floor("cornell-lights", "pool", options);
+}
 
 }  // namespace lumigrove::bench

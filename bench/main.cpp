@@ -145,7 +145,7 @@ int run(int argc, char** argv) {
   app.add_option("--json", command.json_file, "also write the results to this file");
   app.add_flag("--check", command.check, "exit status 1 when a value is above its limit or a relation does not hold");
   CLI::App* again = app.add_subcommand("reproduce", "Look for the relations that a paper reports");
-  again->add_option("paper", command.reproduction, "sst")->required();
+  again->add_option("paper", command.reproduction, "sst or rtslc")->required();
   again->add_option("--only", command.checks, "numbers of the groups of relations to look for, all when none is given");
   again->fallthrough();
   CLI11_PARSE(app, argc, argv);

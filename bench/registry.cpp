@@ -12,6 +12,8 @@ const std::vector<Benchmark>& benchmarks() {
       {"frame.floor.cornell-lights", "ratio", "the same in cornell-lights", 2.0, frame_floor_cornell_lights},
       {"frame.floor.rtslc.cornell-lights", "ratio", "rtslc, 8 samples below shared cuts, likewise", 1.6,
        frame_floor_rtslc_cornell_lights},
+      {"frame.floor.pool.cornell-lights", "ratio", "pool, 8 samples below shared cuts, likewise", 1.6,
+       frame_floor_pool_cornell_lights},
       {"build.tree.1m", "ratio",
        "whole perfect tree of 1 M emitters / tbb::parallel_sort of its (key, index) pairs", 1.0,
        build_tree_1m},
@@ -70,6 +72,7 @@ const std::vector<Benchmark>& benchmarks() {
 const std::vector<Reproduction>& reproductions() {
   static const std::vector<Reproduction> table = {
       {"sst", "W. Tatzgern et al., Stochastic Substitute Trees for Real-Time Global Illumination, I3D 2020", sst_checks()},
+      {"rtslc", "D. Lin, C. Yuksel, Real-Time Stochastic Lightcuts, I3D 2020", rtslc_checks()},
   };
   return table;
 }

@@ -25,7 +25,7 @@ inline const char* verdict_name(Verdict verdict) {
 inline constexpr double kSigmas = 3;
 
 struct Relation {
-  int check = 0;          // number in the list of acceptance checks
+  int check = 0;          // number in the list of acceptance checks; 0: none of them
   std::string scene;      // empty: made for the purpose
   std::string what;       // the quantity
   std::string published;  // in the paper's words or numbers; empty: not published
@@ -63,13 +63,13 @@ inline std::string ours_text(const Relation& r) {
 
 // A line a relation, and its note under it.
 inline std::string relation_header() {
-  return fmt::format("{:<2} {:<12} {:<58} {:>14} {:>18} {:>14}  {}\n", "", "scene", "relation", "published", "ours",
+  return fmt::format("{:<2} {:<14} {:<72} {:>14} {:>18} {:>14}  {}\n", "", "scene", "relation", "published", "ours",
                      "wanted", "");
 }
 inline std::string relation_text(const Relation& r) {
-  std::string text = fmt::format("{:<2} {:<12} {:<58} {:>14} {:>18} {:>14}  {}\n", r.check, r.scene, r.what,
+  std::string text = fmt::format("{:<2} {:<14} {:<72} {:>14} {:>18} {:>14}  {}\n", r.check, r.scene, r.what,
                                  r.published, ours_text(r), limit_text(r), verdict_name(r.verdict()));
-  if (!r.note.empty()) text += fmt::format("{:<16}{}\n", "", r.note);
+  if (!r.note.empty()) text += fmt::format("{:<18}{}\n", "", r.note);
   return text;
 }
 
@@ -109,5 +109,6 @@ const std::vector<Reproduction>& reproductions();  // registry.cpp
 
 // One file each.
 std::vector<Check> sst_checks();
+std::vector<Check> rtslc_checks();
 
 }  // namespace lumigrove::bench

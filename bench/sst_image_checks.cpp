@@ -82,20 +82,7 @@ Estimate rmse_of(const std::vector<double>& squared) {
   return root(mean.estimate());
 }
 
-Estimate mean_of(const std::vector<double>& values) {
-  Mean mean;
-  for (const double value : values) mean.add(value);
-  return mean.estimate();
-}
-
 Estimate rmse_ratio(const std::vector<double>& a, const std::vector<double>& b) { return root(ratio_of_means(a, b)); }
-
-// Mean of a - b, which were measured together.
-Estimate mean_difference(const std::vector<double>& a, const std::vector<double>& b) {
-  Mean mean;
-  for (std::size_t i = 0; i < a.size(); ++i) mean.add(a[i] - b[i]);
-  return mean.estimate();
-}
 
 std::string rmse_note(const std::vector<double>& a, const std::vector<double>& b, double reference_variance) {
   return fmt::format("RMSE {:.4g} and {:.4g}; standard error of the reference {:.2g}, taken off", rmse_of(a).value,

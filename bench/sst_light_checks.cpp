@@ -45,12 +45,6 @@ struct Sampled {
   std::vector<Mean> blocks;    // likewise, of parts of the image
 };
 
-Estimate mean_of(const std::vector<double>& values) {
-  Mean mean;
-  for (const double value : values) mean.add(value);
-  return mean.estimate();
-}
-
 Sampled sample_many(const Study& study, Settings settings, const SeenImage& seen) {
   settings.indirect.spp = kBatchSpp;
   Sampled sampled;

@@ -73,12 +73,6 @@ std::vector<TreeKind> tree_kinds() {
 // What one light sends to the viewer, by the code of virtual point lights.
 vec3 sent_by(const Vpl& vpl, const Surface& s) { return vpl_light(s, exact_vpl(vpl, 1), kClamp, Lobes::kBoth); }
 
-vec3 sent_by(const LightSampler& sampler, const LightSample& sample, const Surface& s) {
-  const float cosine = glm::dot(s.normal, sample.wi);
-  if (!(max_component(sample.weight) > 0) || !(cosine > 0)) return vec3(0);
-  return bsdf_of_sample(sampler, s, sample) * sample.weight * cosine;
-}
-
 TEST(VplLightTree, EmittersSayWhatTheirLightsAre) {
   const VplLights world(one_bright(90).vpls, 16, true, {});
   const LightView lights = world.lights();
@@ -113,7 +107,7 @@ TEST(VplLightTree, ALightSendsWhatTheSubstituteTreesLightsSend) {
       for (sampler.one = 0; sampler.one < world.vpls().size(); ++sampler.one) {
         const Vpl& vpl = world.vpls()[sampler.one];
         const LightSample sample = sample_light(sampler, s, vec4(0.5f));
-        const vec3 expected = sent_by(vpl, s), found = sent_by(sampler, sample, s);
+        const vec3 expected = sent_by(vpl, s), found = unoccluded_light(s, sample);
         for (int c = 0; c < 3; ++c) ASSERT_NEAR(found[c], expected[c], 1e-4f * expected[c] + 1e-9f) << named.name;
         if (!(max_component(expected) > 0)) continue;
         ++lit;
@@ -196,7 +190,7 @@ TEST(VplLightTree, MeanOfEverySelectionIsTheSumOfAll) {
           const LightSampler sampler = world.sampler(choice);
           RunningMean mean;
           for (int i = 0; i < kDraws; ++i)
-            mean.add(static_cast<double>(luminance(sent_by(sampler, sample_light(sampler, s, random.next()), s))));
+            mean.add(static_cast<double>(luminance(unoccluded_light(s, sample_light(sampler, s, random.next())))));
           // 144 comparisons.
           EXPECT_TRUE(mean_within(mean, truth, 4.9, 1e-4 * truth)) << named.name << ", " << static_cast<int>(choice);
         }
@@ -278,7 +272,7 @@ TEST(JointLightTree, BatchesMatchSingleSamplesAndTellTheirKinds) {
         }
         const vec4 u = Rng{rng.seed, rng.frame, pixels[i]}.uniform4(kDimLight);
         const LightSample sample = sample_light(sampler, surfaces[i], u);
-        const vec3 expected = sent_by(sampler, sample, surfaces[i]);
+        const vec3 expected = unoccluded_light(surfaces[i], sample);
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(contribution[i][c], expected[c], 2e-4f * expected[c]) << i;
         if (!(max_component(contribution[i]) > 0)) continue;
         EXPECT_EQ(from_vpl[i] != 0, sample.from_vpl);
@@ -300,14 +294,13 @@ TEST(VplLightTree, GlossIsLitAsAskedFor) {
   for (const Surface& s : walk_surfaces(60)) {
     for (sampler.one = 0; sampler.one < 150; sampler.one += 7) {
       const Vpl& vpl = world.vpls()[sampler.one];
-      const LightSample sample = sample_light(sampler, s, vec4(0.5f));
       for (const bool gloss : {false, true}) {
         for (const float mirror_roughness : {0.0f, 0.3f}) {
           sampler.vpl_gloss = gloss;
           sampler.vpl_mirror_roughness = mirror_roughness;
           const bool both = gloss && s.roughness > mirror_roughness;
           const vec3 expected = vpl_light(s, exact_vpl(vpl, 1), kClamp, both ? Lobes::kBoth : Lobes::kDiffuse);
-          const vec3 found = sent_by(sampler, sample, s);
+          const vec3 found = unoccluded_light(s, sample_light(sampler, s, vec4(0.5f)));
           for (int c = 0; c < 3; ++c) ASSERT_NEAR(found[c], expected[c], 1e-4f * expected[c]);
           differ += both && expected != vpl_light(s, exact_vpl(vpl, 1), kClamp, Lobes::kDiffuse);
         }
@@ -545,6 +538,7 @@ TEST(FrameVplTree, SenselessCombinationsAreRefusedInOneSentence) {
   expect_says(refusal({{"indirect.correction", "0.5"}}, true), {"indirect.joint false"});
   expect_says(refusal({{"indirect.transport", "path"}}, true), {"indirect.transport is 'path'; use 'vpl'"});
   expect_says(refusal({{"direct.hierarchy", "two-level"}}, true), {"use 'perfect', 'saoh' or 'agglomerative'"});
+  expect_says(refusal({{"direct.selection", "pool"}}, true), {"indirect.joint does not combine with pools"});
 }
 
 }  // namespace

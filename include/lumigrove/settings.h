@@ -17,7 +17,7 @@ namespace lumigrove {
 // The axes of the space of methods (docs/papers.md); the table in registry.cpp holds their names.
 enum class Hierarchy : std::uint8_t { kNone, kPerfect, kTwoLevel, kSaoh, kAgglomerative, kSubstitute };
 enum class Weights : std::uint8_t { kMinMax, kSaoh, kYuksel, kDistanceBounded, kInBox };
-enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut };
+enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut, kPool };
 enum class CutBound : std::uint8_t { kNearest, kExact, kChildren };
 enum class Transport : std::uint8_t { kNone, kPath, kVpl };
 enum class Topology : std::uint8_t { kRadix, kPerfect };
@@ -44,6 +44,8 @@ struct SelectionSettings {
 // Light that reaches a surface straight from an emitter.
 struct DirectSettings : SelectionSettings {
   bool mis = false;             // combine with BSDF sampling (balance heuristic)
+  // Pools (kPool): lights are drawn for every cut_share x cut_share pixels, each of which takes spp of them
+  int pool = 64;                // lights of a pool: 16, 32, 48, 64
 };
 
 // Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D. The selection is among

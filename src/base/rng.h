@@ -35,6 +35,8 @@ enum Dimension : std::uint32_t {
   kDimIndirect = 2u << 28,  // sampling of virtual point lights: 12 for each sample
   kDimGather = 3u << 28,    // one more ray from a surface, and the light where it arrives
   kDimCut = 4u << 28,       // 1: pixel that a block's cut is chosen for
+  kDimPool = 5u << 28,      // lights of a block: 4 each
+  kDimPick = 6u << 28,      // which of them a pixel takes: 1 each
 };
 
 // Random numbers of one pixel of one frame. `dimension` counts single floats; blocks of four share one hash.

@@ -66,6 +66,7 @@ void timed(double& ms, const Step& step) {
 DirectLighting away_from_camera(DirectLighting direct) {
   direct.spp = 1;
   direct.use_cuts = false;
+  direct.use_pools = false;
   direct.use_split = false;
   return direct;
 }
@@ -121,7 +122,7 @@ void light_tile(const World& world, const Settings& settings, DirectLighting dir
     launch(count, EmissionKernel{scene, lights, settings.light_scale, b.rays, b.surfaces, b.emission});
   });
 
-  direct.lookup.window = indirect.light_tree.lookup.window = tile;
+  direct.lookup.window = direct.pools.areas.window = indirect.light_tree.lookup.window = tile;
   b.direct_buffers.vpl_sum = settings.indirect.joint ? std::span<vec3>(b.indirect) : std::span<vec3>();
   add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, direct, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,
@@ -197,7 +198,7 @@ bool uses_bvh(const SelectionSettings& s) {
 }
 
 bool uses_tree(const SelectionSettings& s) {
-  return (s.selection == Selection::kRoot || s.selection == Selection::kCut) &&
+  return (s.selection == Selection::kRoot || s.selection == Selection::kCut || s.selection == Selection::kPool) &&
          (s.hierarchy == Hierarchy::kPerfect || s.hierarchy == Hierarchy::kTwoLevel);
 }
 
@@ -283,6 +284,13 @@ void set_selection(const SelectionSettings& settings, const Settings& frame, int
       lighting.lookup.frame = static_cast<std::uint32_t>(frame.frame) + static_cast<std::uint32_t>(sample);
       break;
     }
+    case Selection::kPool:
+      sampler.choice = LightChoice::kTree;
+      lighting.use_pools = true;
+      lighting.pools.interleave = settings.cut_interleave;
+      lighting.pools.areas.share = settings.cut_share * settings.cut_interleave;
+      lighting.pools.areas.frame = static_cast<std::uint32_t>(frame.frame) + static_cast<std::uint32_t>(sample);
+      break;
     case Selection::kAll:
       lighting.all = true;
       break;
@@ -467,6 +475,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   sampler.bvh = world.bvh.view();
   direct.tracer = &world.tracer;
   direct.mis = settings.direct.mis;
+  direct.pools.size = settings.direct.pool;
   set_selection(settings.direct, settings, sample, direct);
   return direct;
 }
@@ -508,6 +517,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   add_pass(stats, "primary hits", sum.primary_ms, sum.primary_rays);
   add_pass(stats, "surfaces", sum.surface_ms, 0);
   if (direct.use_split) add_pass(stats, "splitting", sum.direct_buffers.split_ms, 0);
+  if (direct.use_pools) add_pass(stats, "light pools", sum.direct_buffers.pool_ms, 0);
   if (direct.use_cuts) add_pass(stats, "cuts", sum.direct_buffers.cut_ms, 0);
   add_pass(stats, "light selection", sum.direct_buffers.select_ms, 0);
   add_pass(stats, "shadow rays", sum.direct_buffers.trace_ms, sum.direct_buffers.rays);

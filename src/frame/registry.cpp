@@ -11,6 +11,7 @@
 #include "frame/value_text.h"
 #include "lumigrove/settings.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
+#include "methods/light_sampling/light_pool_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 
 namespace lumigrove {
@@ -264,9 +265,10 @@ std::vector<Setting> direct_rows() {
                                           {"power", Selection::kPower},
                                           {"root", Selection::kRoot},
                                           {"all", Selection::kAll},
-                                          {"cut", Selection::kCut}},
-          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, or walking it "
-          "from every node of a cut"),
+                                          {"cut", Selection::kCut},
+                                          {"pool", Selection::kPool}},
+          "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, walking it "
+          "from every node of a cut, or among lights that were drawn for a block of pixels"),
       choice(
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
           vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
@@ -287,6 +289,10 @@ std::vector<Setting> direct_rows() {
       flag(
           "direct.mis", [](auto& s) -> auto& { return s.direct.mis; },
           "Combine light samples with BSDF samples (balance heuristic)"),
+      choice(
+          "direct.pool", [](auto& s) -> auto& { return s.direct.pool; },
+          vector<pair<string, int>>{{"16", 16}, {"32", 32}, {"48", 48}, {"64", 64}},
+          "Lights that are drawn for a block of cut_share x cut_share pixels; every pixel takes direct.spp of them"),
   };
 }
 
@@ -470,6 +476,16 @@ void check_cuts(const std::string& prefix, const SelectionSettings& s) {
     throw Error(fmt::format("a cut has at most {} nodes, but {}.spp is {}", kMaxCut, prefix, s.spp));
 }
 
+void check_pools(const DirectSettings& s) {
+  if (s.selection != Selection::kPool) return;
+  if (s.hierarchy != Hierarchy::kPerfect)
+    throw Error("direct.selection 'pool' draws its lights from the perfect tree only; set direct.hierarchy 'perfect'");
+  if (s.cut_interleave > kMaxPoolInterleave)
+    throw Error(fmt::format("direct.selection 'pool' interleaves at most {0} x {0} pixels, but direct.cut_interleave is {1}",
+                            kMaxPoolInterleave, s.cut_interleave));
+  if (s.mis) throw Error("direct.mis does not combine with pools; set direct.selection 'root' or 'cut', or direct.mis false");
+}
+
 // Weights that a hierarchy can have, in the words of the rows.
 std::vector<std::string> weights_of(Hierarchy h) {
   if (h == Hierarchy::kSubstitute) return {"distance-bounded", "in-box", "yuksel"};
@@ -507,6 +523,9 @@ void check_joint(const Settings& s) {
   if (s.indirect.transport != Transport::kVpl)
     throw Error(fmt::format("indirect.joint puts VPLs among the lights, but indirect.transport is '{}'; use 'vpl'",
                             get_value(s, "indirect.transport")));
+  if (s.direct.selection == Selection::kPool)
+    throw Error("indirect.joint does not combine with pools, which hold no VPLs; set direct.selection 'root' or 'cut', or "
+                "indirect.joint false");
   const bool walks = s.direct.selection == Selection::kRoot || s.direct.selection == Selection::kCut;
   if (s.direct.hierarchy == Hierarchy::kTwoLevel && walks)
     throw Error("indirect.joint needs one tree over all lights, but direct.hierarchy is 'two-level'; use 'perfect', 'saoh' "
@@ -550,6 +569,18 @@ const std::vector<PresetInfo>& presets() {
         {"direct.weights", "min-max"},
         {"direct.spp", "8"},
         {"direct.cut_share", "8"},
+        {"indirect.transport", "none"}}},
+      {"pool",
+       "Lights drawn for every 8x8 pixels from the perfect light tree, 8 of them taken by each pixel by what they would send "
+       "unoccluded; direct light only",
+       "of this project, from D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts, 2020, and J. Talbot, D. Cline, P. Egbert: "
+       "Importance Resampling for Global Illumination. EGSR 2005",
+       {{"direct.selection", "pool"},
+        {"direct.hierarchy", "perfect"},
+        {"direct.weights", "min-max"},
+        {"direct.spp", "8"},
+        {"direct.cut_share", "8"},
+        {"direct.cut_interleave", "4"},
         {"indirect.transport", "none"}}},
       {"ats",
        "Adaptive tree splitting: a light BVH built by the surface-area-orientation heuristic, split near each surface, a "
@@ -652,6 +683,7 @@ void check(const Settings& s) {
   check_image(s);
   if (s.view) check_view(*s.view);
   check_selection("direct", s, s.direct);
+  check_pools(s.direct);
   check_vpls(s);
 }
 

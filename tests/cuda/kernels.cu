@@ -19,10 +19,13 @@
 #include "lights/vpl_emitter_kernel.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
+#include "methods/light_sampling/light_pool_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/light_sampling/pool_lighting_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 #include "methods/light_tree/light_tree_build_kernel.h"
 #include "methods/light_tree/light_tree_kernel.h"
+#include "methods/light_tree/region_walk_kernel.h"
 #include "methods/light_tree/two_level_tree_build_kernel.h"
 #include "methods/light_tree/two_level_tree_kernel.h"
 #include "methods/reference/path_kernel.h"
@@ -111,6 +114,8 @@ template void cuda::launch<TriangleBoxKernel>(int, const TriangleBoxKernel&, cud
 template void cuda::launch<TreeInstanceKernel>(int, const TreeInstanceKernel&, cudaStream_t);
 template void cuda::launch<InnerNodeKernel<16>>(int, const InnerNodeKernel<16>&, cudaStream_t);
 template void cuda::launch<CutKernel>(int, const CutKernel&, cudaStream_t);
+template void cuda::launch<PoolKernel>(int, const PoolKernel&, cudaStream_t);
+template void cuda::launch<PoolLightKernel>(int, const PoolLightKernel&, cudaStream_t);
 template void cuda::launch<SplitKernel>(int, const SplitKernel&, cudaStream_t);
 template void cuda::launch<DirectLightKernel>(int, const DirectLightKernel&, cudaStream_t);
 template void cuda::launch<AddUnoccludedKernel>(int, const AddUnoccludedKernel&, cudaStream_t);

@@ -6,6 +6,7 @@
 #include "device/device.h"
 #include "lights/unoccluded_kernel.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
+#include "methods/light_sampling/pool_lighting_kernel.h"
 
 namespace lumigrove {
 namespace {
@@ -18,6 +19,12 @@ struct SampleNumbers {
 SampleNumbers numbers_of_sample(std::uint32_t seed, std::uint32_t dimension, std::uint32_t sample) {
   constexpr std::uint32_t kBlocks = (kDimBsdf - kDimLight) / 4;
   return {seed + 0x9e3779b9u * (sample / kBlocks), dimension + 4 * (sample % kBlocks)};
+}
+
+void trace_shadow_rays(const DirectLighting& lighting, DirectBuffers& buffers) {
+  const ScopedTimer timer(buffers.trace_ms);
+  lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
+  for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
 }
 
 // `scale`: 1 / samples.
@@ -34,11 +41,7 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
                              buffers.shadow, buffers.contribution, cuts, stratum, split, buffers.from_vpl},
            kLaunchGrain / kWalkBatch);
   }
-  {
-    const ScopedTimer timer(buffers.trace_ms);
-    lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
-  }
-  for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
+  trace_shadow_rays(lighting, buffers);
   if (buffers.vpl_sum.empty())
     launch(count, AddUnoccludedKernel{buffers.contribution, buffers.occluded, sum});
   else
@@ -93,11 +96,47 @@ void add_split_samples(const DirectLighting& lighting, std::span<const Surface> 
   }
 }
 
+// All samples of so many surfaces are lit before the next, while they are in the cache.
+constexpr std::size_t kSurfacesOfPools = 512;
+
+// `spp` of the lights that were drawn for the surface's area.
+void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
+                      std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
+                      std::span<vec3> sum) {
+  const PoolLookup& lookup = lighting.pools;
+  {
+    const ScopedTimer timer(buffers.pool_ms);
+    buffers.pools.resize(static_cast<std::size_t>(lookup.pools()));
+    launch(lookup.areas.blocks(), PoolKernel{lighting.sampler, lookup, lighting.rng, surfaces, buffers.pools});
+  }
+  const auto samples = static_cast<std::size_t>(lighting.spp);
+  for (std::size_t first = 0; first < surfaces.size(); first += kSurfacesOfPools) {
+    const std::size_t count = std::min(kSurfacesOfPools, surfaces.size() - first), rays = count * samples;
+    buffers.shadow.resize(rays);
+    buffers.contribution.resize(rays);
+    buffers.occluded.resize(rays);
+    {
+      const ScopedTimer timer(buffers.select_ms);
+      launch(walk_batches(static_cast<int>(count)),
+             PoolLightKernel{lighting.sampler, lookup, lighting.rng, dimension, lighting.spp, static_cast<int>(first),
+                             surfaces.subspan(first, count), pixels.subspan(first, count), buffers.pools,
+                             buffers.shadow, buffers.contribution});
+    }
+    trace_shadow_rays(lighting, buffers);
+    for (std::size_t s = 0; s < samples; ++s)
+      launch(static_cast<int>(count),
+             AddUnoccludedKernel{std::span<const vec3>(buffers.contribution).subspan(s * count, count),
+                                 std::span<const std::uint8_t>(buffers.occluded).subspan(s * count, count),
+                                 sum.subspan(first, count)});
+  }
+}
+
 }  // namespace
 
 void DirectBuffers::add_counters(const DirectBuffers& other) {
   rays += other.rays;
   cut_ms += other.cut_ms;
+  pool_ms += other.pool_ms;
   split_ms += other.split_ms;
   select_ms += other.select_ms;
   trace_ms += other.trace_ms;
@@ -106,6 +145,10 @@ void DirectBuffers::add_counters(const DirectBuffers& other) {
 void add_direct_light(const DirectLighting& lighting, std::span<const Surface> surfaces,
                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
                       std::span<vec3> sum) {
+  if (lighting.use_pools) {
+    add_pool_samples(lighting, surfaces, pixels, dimension, buffers, sum);
+    return;
+  }
   buffers.shadow.resize(surfaces.size());
   buffers.contribution.resize(surfaces.size());
   buffers.occluded.resize(surfaces.size());

@@ -7,6 +7,7 @@
 
 #include "base/rng.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
+#include "methods/light_sampling/light_pool_kernel.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/lightcuts/cut_kernel.h"
 #include "scene/surface.h"
@@ -27,6 +28,10 @@ struct DirectLighting {
   bool use_cuts = false;
   CutOptions cut;
   CutLookup lookup;
+  // Pools, where `use_pools`: each surface takes `spp` of the lights that were drawn for its area. As cuts, only for all
+  // surfaces of a tile.
+  bool use_pools = false;
+  PoolLookup pools;
   // Splitting, where `use_split`: `spp` samples below each part that the light BVH is split into.
   bool use_split = false;
   SplitOptions split;
@@ -38,12 +43,13 @@ struct DirectBuffers {
   std::vector<vec3> contribution;
   std::vector<std::uint8_t> occluded;
   std::vector<LightCut> cuts;
+  std::vector<LightPool> pools;
   std::vector<std::uint32_t> split_entries;
   std::vector<std::uint8_t> split_counts;
   std::vector<std::uint8_t> from_vpl;
   std::span<vec3> vpl_sum;  // where not empty, light of virtual point lights is added here instead of to the sum
   std::uint64_t rays = 0;
-  double cut_ms = 0, split_ms = 0, select_ms = 0, trace_ms = 0;
+  double cut_ms = 0, pool_ms = 0, split_ms = 0, select_ms = 0, trace_ms = 0;
 
   void add_counters(const DirectBuffers& other);
 };

@@ -249,10 +249,9 @@ struct DirectLightKernel {
                     weight / (chosen[k].pdf * groups[k].probability));
       lit[k] = true;
     }
-    const LitSurfaces& rows = triangles.surfaces;
-    for (int at = 0; at < rows.count; at += kLitLanes)
-      write_lit<kLitLanes>(light_by_triangles<kLitLanes>(triangles, at), glm::min(kLitLanes, rows.count - at),
-                           rows.index + at, shadow, contribution);
+    for (int at = 0; at < triangles.count; at += kLitLanes)
+      write_lit<kLitLanes>(light_by_triangles<kLitLanes>(triangles, at), glm::min(kLitLanes, triangles.count - at),
+                           triangles.index + at, shadow, contribution);
   }
 
   // And so are virtual point lights.
@@ -270,10 +269,9 @@ struct DirectLightKernel {
       if (!from_vpl.empty()) from_vpl[index[k]] = 1;
       lit[k] = true;
     }
-    const LitSurfaces& rows = vpls.surfaces;
-    for (int at = 0; at < rows.count; at += kLitLanes)
+    for (int at = 0; at < vpls.count; at += kLitLanes)
       write_lit<kLitLanes>(light_by_vpls<kLitLanes>(vpls, sampler.lights.vpl_clamp, at),
-                           glm::min(kLitLanes, rows.count - at), rows.index + at, shadow, contribution);
+                           glm::min(kLitLanes, vpls.count - at), vpls.index + at, shadow, contribution);
   }
 
   // Walks that start at one place go together: all of them without cuts, and those of a block that shares one.
@@ -299,11 +297,8 @@ struct DirectLightKernel {
   }
 
   LUMI_HD LUMI_ALWAYS_INLINE void write(std::size_t i, const LightSample& sample, float weight) const {
-    if (!(max_component(sample.weight) > 0)) return;
     const Surface& surface = surfaces[i];
-    const float cosine = glm::dot(surface.normal, sample.wi);
-    if (!(cosine > 0)) return;
-    vec3 light = bsdf_of_sample(sampler, surface, sample) * sample.weight * (cosine * weight);
+    vec3 light = unoccluded_light(surface, sample) * weight;
     // Balance heuristic of n = 1 / weight light samples and one BSDF sample.
     if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + weight * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;

@@ -35,6 +35,7 @@ struct LightSample {
   std::uint32_t emitter = kNoEmitter;  // local emitter, kNoEmitter for lights at infinity
   float distance = 0;                  // metres; infinite for lights at infinity
   bool from_vpl = false;               // the emitter is a virtual point light,
+  bool gloss = true;                   // which may be wanted for the diffuse lobe only;
   vec3 clear = vec3(0);                // where shadow rays to it end, clear of its own surface
 };
 
@@ -188,8 +189,11 @@ LUMI_HD LUMI_ALWAYS_INLINE LightSample local_sample(const LightSampler& sampler,
   const Emitter& emitter = sampler.lights.emitters[chosen.emitter];
   if (!emitter.triangle()) {
     sample.weight = point.incident / chosen.pdf;
-    sample.from_vpl = emitter.vpl();
-    sample.clear = point.clear;
+    if (emitter.vpl()) {
+      sample.from_vpl = true;
+      sample.gloss = vpls_light_gloss(sampler.vpl_gloss, sampler.vpl_mirror_roughness, surface);
+      sample.clear = point.clear;
+    }
   } else {
     sample.pdf = chosen.pdf * point.area_to_solid / triangle_area(emitter);
     sample.weight = point.incident / sample.pdf;
@@ -305,13 +309,6 @@ LUMI_HD inline LightSample sample_light(const LightSampler& sampler, const Surfa
   return light_in_group(sampler, surface, group, chosen, u_point);
 }
 
-// f(wi, wo) of a sample, 1/sr.
-LUMI_HD inline vec3 bsdf_of_sample(const LightSampler& sampler, const Surface& surface, const LightSample& sample) {
-  const bool diffuse_only =
-      sample.from_vpl && !vpls_light_gloss(sampler.vpl_gloss, sampler.vpl_mirror_roughness, surface);
-  return diffuse_only ? bsdf_eval_diffuse(surface, sample.wi) : bsdf_eval(surface, sample.wi);
-}
-
 // Density per solid angle with which sample_light finds point `y` of `emitter` from `surface`.
 LUMI_HD inline float pdf_light(const LightSampler& sampler, const Surface& surface, std::uint32_t emitter,
                                vec3 y) {
@@ -333,6 +330,14 @@ LUMI_HD inline float pdf_environment_beside_local(const LightSampler& sampler, c
   if (!(p.environment > 0)) return 0;
   const float directional_share = p.directional / (p.directional + p.environment);
   return (1 - directional_share) * pdf_environment(sampler.lights.environment, surface.normal, wi);
+}
+
+// Radiance that a light sample sends towards wo if nothing is in between.
+LUMI_HD LUMI_ALWAYS_INLINE vec3 unoccluded_light(const Surface& surface, const LightSample& sample) {
+  if (!(max_component(sample.weight) > 0)) return vec3(0);
+  const float cosine = glm::dot(surface.normal, sample.wi);
+  if (!(cosine > 0)) return vec3(0);
+  return (sample.gloss ? bsdf_eval(surface, sample.wi) : bsdf_eval_diffuse(surface, sample.wi)) * sample.weight * cosine;
 }
 
 // Segment from the surface to the light sample; it stops short of the light by the same relative margin

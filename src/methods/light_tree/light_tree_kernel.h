@@ -170,11 +170,15 @@ struct BoxWeights {
   Lanes<W> near, far, plain, inside;
 };
 
+// Rounding must not make a light at the horizon impossible: margin of its test, relative to the distance.
+inline constexpr float kHorizonMargin = 2e-6f;
+
 // `cones` is asked for ConeLanes only when `use_cones`.
 template <int W, class Cones>
 LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, bool use_cones, const Cones& cones,
                                                      BoxNearness nearness, const LaneVec3<W>& x, const LaneVec3<W>& n,
-                                                     Weights weights = Weights::kMinMax) {
+                                                     Weights weights = Weights::kMinMax,
+                                                     float horizon_margin = kHorizonMargin) {
   const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), floor2 = broadcast<W>(nearness.floor2);
   const LaneVec3<W>& half = box.half;
   const LaneVec3<W> to_centre{box.centre.x - x.x, box.centre.y - x.y, box.centre.z - x.z};
@@ -189,7 +193,7 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
   const Lanes<W> far = bounded_far2 * inverse_far;
 
   // Height of the box's highest corner above the tangent plane.
-  const Lanes<W> margin = far * 2e-6f;
+  const Lanes<W> margin = far * horizon_margin;
   const Lanes<W> height = add_dot<W>(add_dot<W>(margin, abs_lanes<W>(n), half), n, to_centre);
   const Lanes<W> cosine = min_lanes<W>(max_lanes<W>(height, zero) * inverse_near, one);
   Lanes<W> shining = box.intensity * cosine;
@@ -223,6 +227,7 @@ struct Weighing {
   Weights weights = Weights::kMinMax;  // or kYuksel
   bool cones = true;                   // weights bound the emitters' own cosine
   BoxNearness nearness = 0.0f;
+  float horizon_margin = kHorizonMargin;
 };
 
 LUMI_HD LUMI_ALWAYS_INLINE Weighing weighing_of_level(const LightTreeView& tree, int level, Weights weights) {
@@ -235,7 +240,7 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, con
                                                           const Weighing& weighing, vec3 x, vec3 n) {
   const BoxWeights<W> boxes = weigh_boxes<W>(
       lanes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.nearness, broadcast<W>(x), broadcast<W>(n),
-      weighing.weights);
+      weighing.weights, weighing.horizon_margin);
   const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
   if (weighing.weights == Weights::kYuksel) {
     const Lanes<W> weights = select_lanes<W>(is_inside, boxes.plain, boxes.near);

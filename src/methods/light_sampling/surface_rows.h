@@ -1,28 +1,22 @@
-// Surfaces to be lit together, one a lane, and what they reflect: the arithmetic of bsdf_eval and shadow_ray.
+// Surfaces, each number by itself so that a row of lanes can be read at once; and their gloss, many at once.
 #pragma once
 
 #include "base/lane_math.h"
-#include "lights/emitter.h"
+#include "lights/light_set.h"
 #include "lights/lit_lanes.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "scene/surface.h"
 
 namespace lumigrove {
 
-// Surfaces and the emitters chosen for them, each number by itself so that a row of lanes can be read at once.
-struct alignas(64) LitSurfaces {
+struct alignas(64) SurfaceRows {
   float position[3][kWalkBatch] = {}, normal[3][kWalkBatch] = {}, geometric_normal[3][kWalkBatch] = {};
   float wo[3][kWalkBatch] = {}, diffuse[3][kWalkBatch] = {}, specular[3][kWalkBatch] = {};
   float roughness[kWalkBatch] = {}, epsilon[kWalkBatch] = {};
-  float weight[kWalkBatch] = {};  // over the probability of the choice
-  const Emitter* emitter[kWalkBatch];
-  std::uint32_t index[kWalkBatch];
-  int count = 0;
   bool any_gloss = false;
 
-  // Returns its place. `gloss`: is its gloss lobe lit?
-  LUMI_HD int add(std::uint32_t surface_index, const Surface& s, const Emitter& e, bool gloss, float over_probability) {
-    const int i = count++;
+  // `gloss`: is the gloss lobe lit?
+  LUMI_HD void set(int i, const Surface& s, bool gloss = true) {
     const vec3 lit_specular = gloss ? s.specular : vec3(0);
     for (int axis = 0; axis < 3; ++axis) {
       position[axis][i] = s.position[axis];
@@ -34,11 +28,7 @@ struct alignas(64) LitSurfaces {
     }
     roughness[i] = s.roughness;
     epsilon[i] = s.epsilon;
-    weight[i] = over_probability;
-    emitter[i] = &e;
-    index[i] = surface_index;
     any_gloss = any_gloss || max_component(lit_specular) > 0;
-    return i;
   }
 };
 
@@ -47,34 +37,14 @@ LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> load_rows(const float (&rows)[3][kWalkBat
   return {load_lanes<L>(rows[0] + first), load_lanes<L>(rows[1] + first), load_lanes<L>(rows[2] + first)};
 }
 
-// p0, e1 and e2 of each lane's emitter.
-template <int L>
-struct EmitterLanes {
-  LaneVec3<L> p0, e1, e2;
-};
-template <int L>
-LUMI_HD LUMI_ALWAYS_INLINE EmitterLanes<L> load_emitters(const LitSurfaces& rows, int first) {
-  constexpr int kWords = 9;
-  Lanes<L> words[16];  // words[w][lane]
-  LUMI_UNROLL(2)
-  for (int part = 0; part < 16; part += L) {
-    LUMI_UNROLL(16)
-    for (int i = 0; i < L; ++i) {
-      const int lane = glm::min(first + i, rows.count - 1);
-      words[part + i] = load_first_lanes<L>(&rows.emitter[lane]->p0.x + part, glm::clamp(kWords - part, 0, L));
-    }
-    transpose_lanes<L>(words + part);
-  }
-  return {{words[0], words[1], words[2]}, {words[3], words[4], words[5]}, {words[6], words[7], words[8]}};
-}
-
 // The gloss lobe's part of f; see bsdf.h. `cos_surface` > 0.
 template <int L>
-LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> gloss_lanes(const LitSurfaces& rows, int first, const LaneVec3<L>& n,
-                                                   const LaneVec3<L>& wi, const Lanes<L>& cos_surface) {
+LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> gloss_lanes(const SurfaceRows& surfaces, int first,
+                                                   const LaneVec3<L>& n, const LaneVec3<L>& wi,
+                                                   const Lanes<L>& cos_surface) {
   const Lanes<L> zero = broadcast<L>(0), one = broadcast<L>(1), tiny = broadcast<L>(1e-30f);
-  const LaneVec3<L> wo = load_rows<L>(rows.wo, first), specular = load_rows<L>(rows.specular, first);
-  const Lanes<L> roughness = load_lanes<L>(rows.roughness + first), alpha = roughness * roughness,
+  const LaneVec3<L> wo = load_rows<L>(surfaces.wo, first), specular = load_rows<L>(surfaces.specular, first);
+  const Lanes<L> roughness = load_lanes<L>(surfaces.roughness + first), alpha = roughness * roughness,
                  a2 = alpha * alpha, k = a2 * 0.5f;
   const LaneVec3<L> h{wi.x + wo.x, wi.y + wo.y, wi.z + wo.z};
   const Lanes<L> n_h = dot<L>(n, h), h2 = dot<L>(h, h), cos_view = dot<L>(n, wo);
@@ -91,34 +61,63 @@ LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> gloss_lanes(const LitSurfaces& rows, int 
           multiply_add<L>(one - specular.z, miss5, specular.z) * seen};
 }
 
-// f(wi, wo), 1/sr, for wi above the surfaces.
+// f of both lobes.
 template <int L>
-LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> bsdf_lanes(const LitSurfaces& rows, int first, const LaneVec3<L>& n,
+LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> bsdf_lanes(const SurfaceRows& surfaces, int first, const LaneVec3<L>& n,
                                                   const LaneVec3<L>& wi, const Lanes<L>& cos_surface) {
-  const LaneVec3<L> diffuse = load_rows<L>(rows.diffuse, first);
+  const LaneVec3<L> diffuse = load_rows<L>(surfaces.diffuse, first);
   const LaneVec3<L> f{diffuse.x * kInvPi, diffuse.y * kInvPi, diffuse.z * kInvPi};
-  if (!rows.any_gloss) return f;
-  const LaneVec3<L> gloss = gloss_lanes<L>(rows, first, n, wi, cos_surface);
+  if (!surfaces.any_gloss) return f;
+  const LaneVec3<L> gloss = gloss_lanes<L>(surfaces, first, n, wi, cos_surface);
   return {f.x + gloss.x, f.y + gloss.y, f.z + gloss.z};
 }
 
-// The shadow ray from the surface to `end`, or none where `radiance` is nothing, or more than a float holds.
+// Shadow rays from the surfaces towards points `y`, as far as `end` of the way, that send `radiance` towards wo. None where
+// there is nothing to send, or more than a float holds.
 template <int L>
-LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> lit_from(const LitSurfaces& rows, int first, const LaneVec3<L>& x,
-                                                const LaneVec3<L>& end, const Lanes<L>& tmax,
-                                                const LaneVec3<L>& radiance) {
-  const Lanes<L> zero = broadcast<L>(0), epsilon = load_lanes<L>(rows.epsilon + first);
-  const LaneVec3<L> geometric = load_rows<L>(rows.geometric_normal, first);
+LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> lit_lanes_until(const SurfaceRows& surfaces, int first,
+                                                       const LaneVec3<L>& radiance, const LaneVec3<L>& y,
+                                                       const Lanes<L>& end) {
+  const Lanes<L> zero = broadcast<L>(0), one = broadcast<L>(1);
+  const LaneVec3<L> x = load_rows<L>(surfaces.position, first),
+                    geometric = load_rows<L>(surfaces.geometric_normal, first);
+  const Lanes<L> epsilon = load_lanes<L>(surfaces.epsilon + first);
   LitLanes<L> lit;
   lit.radiance = radiance;
   lit.origin = {multiply_add<L>(geometric.x, epsilon, x.x), multiply_add<L>(geometric.y, epsilon, x.y),
                 multiply_add<L>(geometric.z, epsilon, x.z)};
-  lit.direction = {end.x - lit.origin.x, end.y - lit.origin.y, end.z - lit.origin.z};
+  lit.direction = {y.x - lit.origin.x, y.y - lit.origin.y, y.z - lit.origin.z};
   lit.tmin = zero;
   const Lanes<L> strength = max_lanes<L>(radiance.x, max_lanes<L>(radiance.y, radiance.z));
   const Lanes<L> sends = choose_where_greater<L>(broadcast<L>(3e38f), strength, strength, zero);
-  lit.tmax = choose_where_greater<L>(sends, zero, tmax, zero - broadcast<L>(1));
+  lit.tmax = choose_where_greater<L>(sends, zero, end, zero - one);
   return lit;
+}
+
+// The same to points 1 / `inverse` away: they stop short of the light by the margin of shadow_ray.
+template <int L>
+LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> lit_lanes(const SurfaceRows& surfaces, int first, const LaneVec3<L>& radiance,
+                                                 const LaneVec3<L>& y, const Lanes<L>& inverse) {
+  const Lanes<L> epsilon = load_lanes<L>(surfaces.epsilon + first);
+  const Lanes<L> end =
+      broadcast<L>(1) - min_lanes<L>(broadcast<L>(0.5f), multiply_add<L>(epsilon, inverse, broadcast<L>(1e-4f)));
+  return lit_lanes_until<L>(surfaces, first, radiance, y, end);
+}
+
+// words[w][lane] = word w of the lane's emitter: p0, e1, e2.
+template <int L>
+LUMI_HD LUMI_ALWAYS_INLINE void load_emitters(const Emitter* const* emitters, int first, int count,
+                                              Lanes<L> (&words)[16]) {
+  constexpr int kWords = 9;
+  LUMI_UNROLL(2)
+  for (int part = 0; part < 16; part += L) {
+    LUMI_UNROLL(16)
+    for (int i = 0; i < L; ++i) {
+      const int lane = glm::min(first + i, count - 1);
+      words[part + i] = load_first_lanes<L>(&emitters[lane]->p0.x + part, glm::clamp(kWords - part, 0, L));
+    }
+    transpose_lanes<L>(words + part);
+  }
 }
 
 }  // namespace lumigrove

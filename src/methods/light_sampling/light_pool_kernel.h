@@ -1,0 +1,210 @@
+// Method      Draws lights once for an area of pixels; every pixel takes some of them, in proportion to what each would
+//             send if nothing were in the way.
+// Paper       none of its own. J. Talbot, D. Cline, P. Egbert, "Importance Resampling for Global Illumination", EGSR 2005,
+//             for the choice among the drawn; B. Walter et al., "Lightcuts", SIGGRAPH 2005, whose clusters stand by one
+//             light for all pixels; A. Keller, W. Heidrich, "Interleaved Sampling", EGWR 2001; D. Lin, C. Yuksel,
+//             "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020), for the tree, and for blocks of pixels that
+//             share their look at it; P. Clarberg et al., "Wavelet Importance Sampling", SIGGRAPH 2005, for walks of
+//             ordered numbers that go down together.
+// Symbols     y_j, p_j -> LightPool -> point on a light, drawn for the area; probability of the light, over its area
+//             M -> PoolLookup::size -> lights of a pool; m -> interleave -> an area has m^2 pools
+//             q_j(x) -> pool_weights -> Y of the irradiance at x from y_j, unoccluded, over p_j M
+//             P_j(x) = q_j / sum q -> probability with which x takes y_j
+// Equations   L(x) = mean over what x takes of f(y_j) / (p_j M P_j)
+// Departures  The walks are those of the light tree, weighed for the whole area instead of a point: WalkRegion. All M m^2
+//             lights of an area come from strata of one set of walks, and the pools share them out in turn.
+// Estimator   unbiased: every light that can reach a point of the area is drawn with positive probability, and one that
+//             reaches x has q_j > 0. Pixels that share a pool err together; interleaving makes grain of that.
+// In -> Out   surfaces of a tile -> LightPools; surfaces, pools -> shadow rays and contributions (pool_lighting_kernel.h)
+// Oracle      tests/light_pool_test.cpp: exhaustive sum, walks against those of single points, lanes against scalars.
+#pragma once
+
+#include <span>
+
+#include "base/lane_math.h"
+#include "base/rng.h"
+#include "methods/light_sampling/light_sampler_kernel.h"
+#include "methods/light_tree/region_walk_kernel.h"
+#include "methods/lightcuts/cut_kernel.h"
+
+namespace lumigrove {
+
+inline constexpr int kMaxPool = 64, kMaxPoolInterleave = 4;
+inline constexpr int kMaxDraws = kMaxPool * kMaxPoolInterleave * kMaxPoolInterleave;
+
+// A point on a light: 16 numbers, so that many can be turned into rows of lanes.
+struct alignas(64) PoolLight {
+  vec3 position;
+  vec3 axis;              // normal, or a spot light's axis; what leaves the light depends on the cosine c to it:
+  vec3 strength;          // radiance times area, or intensity, over p_j M
+  float offset, scale;    // share = offset + scale * max(c, -c * two_sided), from 0 to 1
+  float two_sided;        // 1 or -1
+  float squared;          // 1: the share is squared, 0: it is not
+  float inverse_range2;   // 1/m^2; 0 = unlimited
+  float unused[2];
+};
+
+struct alignas(64) LightPool {
+  float x[kMaxPool], y[kMaxPool], z[kMaxPool];
+  float axis_x[kMaxPool], axis_y[kMaxPool], axis_z[kMaxPool];
+  float strength[kMaxPool];  // Y
+  float offset[kMaxPool], scale[kMaxPool], two_sided[kMaxPool];
+  PoolLight lights[kMaxPool];
+
+  LUMI_HD void set(int j, const PoolLight& light) {
+    lights[j] = light;
+    x[j] = light.position.x, y[j] = light.position.y, z[j] = light.position.z;
+    axis_x[j] = light.axis.x, axis_y[j] = light.axis.y, axis_z[j] = light.axis.z;
+    strength[j] = luminance(light.strength);
+    offset[j] = light.offset, scale[j] = light.scale, two_sided[j] = light.two_sided;
+  }
+};
+
+// Which pool a pixel takes its lights from: neighbours use different ones, so that what pixels have in common does not show
+// as blocks.
+struct PoolLookup {
+  CutLookup areas;     // share: edge of an area
+  int interleave = 1;  // m
+  int size = kMaxPool; // M
+
+  LUMI_HD int pools_per_area() const { return interleave * interleave; }
+  LUMI_HD int pools() const { return areas.blocks() * pools_per_area(); }
+  LUMI_HD int pool_of(Pixel pixel) const {
+    const int m = interleave;
+    const auto quad_x = static_cast<std::uint32_t>(pixel.x / m), quad_y = static_cast<std::uint32_t>(pixel.y / m);
+    const std::uint32_t turn = pcg4d(uvec4(quad_x, quad_y, areas.frame, 0x51ab3f1u)).x >> 8;
+    const std::uint32_t place = static_cast<std::uint32_t>(pixel.y % m * m + pixel.x % m) + turn;
+    const auto number = static_cast<int>(place % static_cast<std::uint32_t>(m * m));
+    return areas.block_of(pixel) * pools_per_area() + number;
+  }
+};
+
+// --- drawing -------------------------------------------------------------------------------------------------
+
+// Where the surfaces of an area lie: in a box, their normals n with |n - normal| <= spread.
+struct AreaBounds {
+  Box3 box;
+  vec3 normal = vec3(0);
+  float spread = 0;
+  bool present = false;
+};
+
+LUMI_HD inline AreaBounds bounds_of_area(const CutLookup& lookup, const PixelWindow& pixels,
+                                         std::span<const Surface> surfaces) {
+  AreaBounds bounds;
+  vec3 normals(0);
+  const auto each = [&](const auto& f) {
+    for (int y = pixels.y0; y < pixels.y1; ++y)
+      for (int x = pixels.x0; x < pixels.x1; ++x) {
+        const Surface& s = surfaces[static_cast<std::size_t>(index_of_pixel(lookup.window, Pixel{x, y}))];
+        if (s.instance != kNoId) f(s);
+      }
+  };
+  each([&](const Surface& s) {
+    bounds.present = true;
+    bounds.box = unite(bounds.box, s.position);
+    normals += s.normal;
+  });
+  const float length = glm::length(normals);
+  if (length > 1e-3f) bounds.normal = normals * (1 / length);
+  float spread2 = 0;
+  each([&](const Surface& s) { spread2 = glm::max(spread2, length_squared(s.normal - bounds.normal)); });
+  bounds.spread = glm::sqrt(spread2);
+  return bounds;
+}
+
+LUMI_HD inline PoolLight punctual_pool_light(const LightView& lights, const Emitter& e, float weight) {
+  const PunctualView& light = lights.punctual[e.source & ~Emitter::kPunctual];
+  PoolLight result{};
+  result.position = e.p0;
+  result.strength = light.intensity * weight;
+  result.offset = light.spot ? -e.e2.x * e.e2.y : 1.0f;
+  result.scale = light.spot ? e.e2.y : 0.0f;
+  if (light.spot) result.axis = e.e1;
+  result.two_sided = -1;
+  result.squared = light.spot ? 1.0f : 0.0f;
+  result.inverse_range2 = light.range > 0 ? 1 / (light.range * light.range) : 0.0f;
+  return result;
+}
+
+LUMI_HD inline PoolLight triangle_pool_light(const SceneView& scene, const LightView& lights, std::uint32_t index,
+                                             vec2 u, float weight) {
+  const Emitter& e = lights.emitters[index];
+  const EmissiveInstance& instance = lights.instances[e.source];
+  const vec3 n = glm::cross(e.e1, e.e2);
+  const float area2 = glm::length(n);
+  PoolLight result{};
+  if (!(area2 > 0)) return result;
+  const float root = glm::sqrt(u.x), b1 = 1 - root, b2 = u.y * root;  // uniform by area
+  result.position = e.p0 + e.e1 * b1 + e.e2 * b2;
+  result.axis = n * (1 / area2);
+  result.strength = instance.radiance * (0.5f * area2 * weight);
+  result.scale = 1;
+  result.two_sided = instance.double_sided ? 1.0f : -1.0f;
+  if (instance.textured || instance.masked) {
+    const MeshPoint point = mesh_point(scene, instance, e, index, b1, b2);
+    if (instance.textured) result.strength *= emissive_texture_at(scene, point);
+    if (instance.masked && is_cut_out(scene, point)) result.strength = vec3(0);
+  }
+  return result;
+}
+
+// What a walk chose, as one of `draws` lights of a pool; dark where it chose none.
+LUMI_HD inline PoolLight make_pool_light(const LightSampler& sampler, TreeSample chosen, vec2 u, int draws) {
+  PoolLight light{};
+  if (chosen.pdf > 0) {
+    const float weight = 1 / (chosen.pdf * static_cast<float>(draws));
+    const Emitter& e = sampler.lights.emitters[chosen.emitter];
+    light = e.punctual() ? punctual_pool_light(sampler.lights, e, weight)
+                         : triangle_pool_light(sampler.scene, sampler.lights, chosen.emitter, u, weight);
+  }
+  if (!is_finite(light.strength)) light.strength = vec3(0);
+  return light;
+}
+
+// The pools of an area share out lights that are drawn together, each from a stratum of its own.
+struct PoolKernel {
+  LightSampler sampler;
+  PoolLookup lookup;
+  Rng rng;
+  std::span<const Surface> surfaces;
+  std::span<LightPool> pools;
+
+  LUMI_HD void operator()(int area) const {
+    const int many = lookup.pools_per_area(), count = many * lookup.size;
+    TreeSample chosen[kMaxDraws];
+    vec2 u[kMaxDraws];
+    draw(area, count, chosen, u);
+    for (int j = 0; j < count; ++j)
+      pools[static_cast<std::size_t>(area * many + j % many)].set(
+          j / many, make_pool_light(sampler, chosen[j], u[j], lookup.size));
+  }
+
+ private:
+  LUMI_HD void draw(int area, int count, TreeSample* chosen, vec2* u) const {
+    const PixelWindow pixels = lookup.areas.pixels_of(area);
+    const AreaBounds bounds = bounds_of_area(lookup.areas, pixels, surfaces);
+    const LightTreeView& tree = sampler.tree;
+    if (!bounds.present || tree.count == 0) {
+      for (int j = 0; j < count; ++j) chosen[j] = {};
+      return;
+    }
+    const auto corner = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
+    const Rng numbers{rng.seed, rng.frame, corner};
+    float r[kMaxDraws], fresh[kMaxDraws];
+    for (int j = 0; j < count; ++j) {
+      const vec4 v = numbers.uniform4(kDimPool + 4 * static_cast<std::uint32_t>(j));
+      r[j] = glm::min((static_cast<float>(j) + v.x) / static_cast<float>(count), 0x1.fffffep-1f);
+      fresh[j] = v.w;
+      u[j] = vec2(v.y, v.z);
+    }
+    const WalkRegion region{bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
+    WalkRange ranges[kMaxDraws], next[kMaxDraws];
+    const auto n = static_cast<std::size_t>(count);
+    sample_light_tree_sorted(tree, region, {{r, n}, {fresh, n}, {ranges, n}, {next, n}}, {chosen, n});
+    for (int j = 0; j < count; ++j)
+      if (chosen[j].pdf > 0) prefetch(&sampler.lights.emitters[chosen[j].emitter]);
+  }
+};
+
+}  // namespace lumigrove

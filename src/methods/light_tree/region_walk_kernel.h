@@ -1,0 +1,104 @@
+// Many walks down the light tree at once for all points of a region; light_tree_kernel.h holds the method. As their numbers
+// ascend, the walks that come to a node are neighbours, and its children are weighed once for all of them
+// (P. Clarberg et al., "Wavelet Importance Sampling", SIGGRAPH 2005, warp points through a hierarchy in this way).
+#pragma once
+
+#include <span>
+
+#include "methods/light_tree/light_tree_kernel.h"
+
+namespace lumigrove {
+
+// Points within `half` of `centre`, with unit normals n of |n - normal| <= spread.
+struct WalkRegion {
+  vec3 centre, half;  // metres
+  vec3 normal;
+  float spread = 0;
+};
+
+// Weights for a region: every one that is positive for a point of it is positive. No point is nearer to a box, nor the box
+// higher above its horizon, than the centre is to the box enlarged by the region, with a margin for the normals.
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children_of_region(const LightNode<W>& node, Weighing weighing,
+                                                                    const WalkRegion& region) {
+  BoxLanes<W> boxes = load_boxes<W>(node);
+  boxes.half = {boxes.half.x + region.half.x, boxes.half.y + region.half.y, boxes.half.z + region.half.z};
+  weighing.horizon_margin += region.spread;
+  return weigh_children<W>(boxes, node, weighing, region.centre, region.normal);
+}
+
+// Walks first, ..., end - 1 of a sorted set, which have come the same way.
+struct WalkRange {
+  std::uint32_t node;  // of the level to come
+  float pdf;
+  std::uint32_t first, end;
+};
+
+// Numbers of walks, ascending, in [0,1); overwritten. `fresh` ones take over in the lower half of the levels for walks that
+// go alone, so that they keep enough bits. `ranges`, `next`: room for one each a walk.
+struct SortedWalks {
+  std::span<float> r;
+  std::span<const float> fresh;
+  std::span<WalkRange> ranges, next;
+};
+
+// samples[i]: of the walk with number r[i]; kNoEmitter and 0 on a dead branch.
+template <int W, Weights kWeights>
+LUMI_HD inline void walk_light_tree_sorted(const LightTreeView& tree, const WalkRegion& region,
+                                           const SortedWalks& walks, std::span<TreeSample> samples) {
+  WalkRange *ranges = walks.ranges.data(), *next = walks.next.data();
+  float* const r = walks.r.data();
+  int living = 1;
+  ranges[0] = {0, 1, 0, static_cast<std::uint32_t>(samples.size())};
+  for (int level = 0; level < tree.levels; ++level) {
+    const LightNode<W>* nodes = tree.level<W>(level);
+    const Weighing weighing = weighing_of_level(tree, level, kWeights);
+    const bool second_number = level == (tree.levels + 1) / 2, last = level + 1 == tree.levels;
+    int kept = 0;
+    for (int k = 0; k < living; ++k) {
+      const WalkRange range = ranges[k];
+      const ChildWeights<W> children = weigh_children_of_region<W>(nodes[range.node], weighing, region);
+      const std::uint32_t positive = greater_bits<W>(children.weight, broadcast<W>(0));
+      if (!(children.total > 0) || positive == 0) {
+        for (std::uint32_t i = range.first; i < range.end; ++i) samples[i] = {};
+        continue;
+      }
+      if (second_number && range.end == range.first + 1) r[range.first] = walks.fresh[range.first];
+      alignas(64) float weights[W], sums[W];
+      store_lanes<W>(children.weight, weights);
+      store_lanes<W>(children.cumulative, sums);
+      for (std::uint32_t i = range.first; i < range.end;) {
+        const std::uint32_t beyond =
+            greater_bits<W>(children.cumulative, broadcast<W>(r[i] * children.total)) & positive;
+        const int lane = beyond != 0 ? lowest_bit(beyond) : highest_bit(positive);
+        const float before = sums[lane] - weights[lane], inverse = 1 / weights[lane];
+        const float end = beyond != 0 ? sums[lane] : kInfinity;
+        WalkRange child{range.node * W + static_cast<std::uint32_t>(lane), range.pdf * (weights[lane] / children.total),
+                        i, i};
+        for (; i < range.end && r[i] * children.total < end; ++i) {
+          r[i] = glm::min(glm::max((r[i] * children.total - before) * inverse, 0.0f), 0x1.fffffep-1f);
+          if (last) samples[i] = {tree.leaf_emitters[child.node], child.pdf};
+        }
+        if (last) continue;
+        child.end = i;
+        next[kept++] = child;
+        prefetch_step<W>(tree, level + 1, child.node);
+      }
+    }
+    WalkRange* const done = ranges;
+    ranges = next;
+    next = done;
+    living = kept;
+  }
+}
+
+// As many walks as samples. tree.count > 0.
+LUMI_HD inline void sample_light_tree_sorted(const LightTreeView& tree, const WalkRegion& region,
+                                             const SortedWalks& walks, std::span<TreeSample> samples) {
+  with_width(tree.width, [&](auto width) {
+    with_weights(tree.weights,
+                 [&](auto weights) { walk_light_tree_sorted<width, weights>(tree, region, walks, samples); });
+  });
+}
+
+}  // namespace lumigrove
