@@ -579,7 +579,7 @@ const std::vector<PresetInfo>& presets() {
         {"direct.hierarchy", "perfect"},
         {"direct.weights", "min-max"},
         {"direct.spp", "8"},
-        {"direct.cut_share", "8"},
+        {"direct.cut_share", "4"},
         {"direct.cut_interleave", "4"},
         {"indirect.transport", "none"}}},
       {"ats",

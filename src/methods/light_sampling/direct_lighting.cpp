@@ -99,11 +99,10 @@ void add_split_samples(const DirectLighting& lighting, std::span<const Surface> 
 // All samples of so many surfaces are lit before the next, while they are in the cache.
 constexpr std::size_t kSurfacesOfPools = 512;
 
-// `spp` of the lights that were drawn for the surface's area.
-void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
-                      std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
-                      std::span<vec3> sum) {
-  const PoolLookup& lookup = lighting.pools;
+// `spp` of the lights that were drawn for the surface's area. `lookup`: of these surfaces.
+void add_pool_samples_of_strip(const DirectLighting& lighting, const PoolLookup& lookup,
+                               std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
+                               std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   {
     const ScopedTimer timer(buffers.pool_ms);
     buffers.pools.resize(static_cast<std::size_t>(lookup.pools()));
@@ -128,6 +127,26 @@ void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> s
              AddUnoccludedKernel{std::span<const vec3>(buffers.contribution).subspan(s * count, count),
                                  std::span<const std::uint8_t>(buffers.occluded).subspan(s * count, count),
                                  sum.subspan(first, count)});
+  }
+}
+
+// A row of areas at a time, whose pools fit the cache, where its surfaces lie together.
+void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> surfaces,
+                      std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
+                      std::span<vec3> sum) {
+  const PixelWindow window = lighting.pools.areas.window;
+  const int edge = lighting.pools.areas.share;
+  const bool together = edge % kPixelSuperblock == 0 && window.y0 % kPixelSuperblock == 0;
+  std::size_t first = 0;
+  for (int y = window.y0; y < window.y1;) {
+    PoolLookup lookup = lighting.pools;
+    lookup.areas.window.y0 = y;
+    if (together) lookup.areas.window.y1 = std::min(window.y1, (y / edge + 1) * edge);
+    const auto count = static_cast<std::size_t>(lookup.areas.window.count());
+    add_pool_samples_of_strip(lighting, lookup, surfaces.subspan(first, count), pixels.subspan(first, count),
+                              dimension, buffers, sum.subspan(first, count));
+    first += count;
+    y = lookup.areas.window.y1;
   }
 }
 

@@ -7,11 +7,12 @@
 //             share their look at it; P. Clarberg et al., "Wavelet Importance Sampling", SIGGRAPH 2005, for walks of
 //             ordered numbers that go down together.
 // Symbols     y_j, p_j -> LightPool -> point on a light, drawn for the area; probability of the light, over its area
-//             M -> PoolLookup::size -> lights of a pool; m -> interleave -> an area has m^2 pools
+//             M -> PoolLookup::size -> lights of a pool; m -> interleave -> an area has m^2 / 2 pools, and its pixels
+//             take turns
 //             q_j(x) -> pool_weights -> Y of the irradiance at x from y_j, unoccluded, over p_j M
 //             P_j(x) = q_j / sum q -> probability with which x takes y_j
 // Equations   L(x) = mean over what x takes of f(y_j) / (p_j M P_j)
-// Departures  The walks are those of the light tree, weighed for the whole area instead of a point: WalkRegion. All M m^2
+// Departures  The walks are those of the light tree, weighed for the whole area instead of a point: WalkRegion. All
 //             lights of an area come from strata of one set of walks, and the pools share them out in turn.
 // Estimator   unbiased: every light that can reach a point of the area is drawn with positive probability, and one that
 //             reaches x has q_j > 0. Pixels that share a pool err together; interleaving makes grain of that.
@@ -30,7 +31,7 @@
 namespace lumigrove {
 
 inline constexpr int kMaxPool = 64, kMaxPoolInterleave = 4;
-inline constexpr int kMaxDraws = kMaxPool * kMaxPoolInterleave * kMaxPoolInterleave;
+inline constexpr int kMaxDraws = kMaxPool * ((kMaxPoolInterleave * kMaxPoolInterleave + 1) / 2);
 
 // A point on a light: 16 numbers, so that many can be turned into rows of lanes.
 struct alignas(64) PoolLight {
@@ -67,7 +68,8 @@ struct PoolLookup {
   int interleave = 1;  // m
   int size = kMaxPool; // M
 
-  LUMI_HD int pools_per_area() const { return interleave * interleave; }
+  // Two pixels of every m x m share one: as many again would cost more than they gain.
+  LUMI_HD int pools_per_area() const { return (interleave * interleave + 1) / 2; }
   LUMI_HD int pools() const { return areas.blocks() * pools_per_area(); }
   LUMI_HD int pool_of(Pixel pixel) const {
     const int m = interleave;
@@ -75,7 +77,7 @@ struct PoolLookup {
     const std::uint32_t turn = pcg4d(uvec4(quad_x, quad_y, areas.frame, 0x51ab3f1u)).x >> 8;
     const std::uint32_t place = static_cast<std::uint32_t>(pixel.y % m * m + pixel.x % m) + turn;
     const auto number = static_cast<int>(place % static_cast<std::uint32_t>(m * m));
-    return areas.block_of(pixel) * pools_per_area() + number;
+    return areas.block_of(pixel) * pools_per_area() + number / 2;
   }
 };
 
@@ -173,15 +175,15 @@ struct PoolKernel {
   LUMI_HD void operator()(int area) const {
     const int many = lookup.pools_per_area(), count = many * lookup.size;
     TreeSample chosen[kMaxDraws];
-    vec2 u[kMaxDraws];
-    draw(area, count, chosen, u);
+    float u[2][kMaxDraws];  // point on the light
+    draw(area, count, chosen, u[0], u[1]);
     for (int j = 0; j < count; ++j)
       pools[static_cast<std::size_t>(area * many + j % many)].set(
-          j / many, make_pool_light(sampler, chosen[j], u[j], lookup.size));
+          j / many, make_pool_light(sampler, chosen[j], vec2(u[0][j], u[1][j]), lookup.size));
   }
 
  private:
-  LUMI_HD void draw(int area, int count, TreeSample* chosen, vec2* u) const {
+  LUMI_HD void draw(int area, int count, TreeSample* chosen, float* u, float* v) const {
     const PixelWindow pixels = lookup.areas.pixels_of(area);
     const AreaBounds bounds = bounds_of_area(lookup.areas, pixels, surfaces);
     const LightTreeView& tree = sampler.tree;
@@ -192,11 +194,13 @@ struct PoolKernel {
     const auto corner = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
     const Rng numbers{rng.seed, rng.frame, corner};
     float r[kMaxDraws], fresh[kMaxDraws];
+    const float inverse_count = 1 / static_cast<float>(count);
     for (int j = 0; j < count; ++j) {
-      const vec4 v = numbers.uniform4(kDimPool + 4 * static_cast<std::uint32_t>(j));
-      r[j] = glm::min((static_cast<float>(j) + v.x) / static_cast<float>(count), 0x1.fffffep-1f);
-      fresh[j] = v.w;
-      u[j] = vec2(v.y, v.z);
+      const vec4 w = numbers.uniform4(kDimPool + 4 * static_cast<std::uint32_t>(j));
+      r[j] = glm::min((static_cast<float>(j) + w.x) * inverse_count, 0x1.fffffep-1f);
+      u[j] = w.y;
+      v[j] = w.z;
+      fresh[j] = w.w;
     }
     const WalkRegion region{bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
     WalkRange ranges[kMaxDraws], next[kMaxDraws];
