@@ -341,7 +341,7 @@ void report_depth(int check, const std::string& scene_name, const std::string& s
 // --- 9: weights ------------------------------------------------------------------------------------------------
 
 // Mean variance of a sample of one of the VPLs (leaves only) at the surfaces seen, one value a set of VPLs.
-std::vector<double> variances(Study& study, const SeenImage& seen, Settings settings, IndirectWeights weights) {
+std::vector<double> variances(Study& study, const SeenImage& seen, Settings settings, Weights weights) {
   constexpr int kSets = 8, kSamples = 48;
   settings.indirect.stop = Stop::kLeaf;
   settings.indirect.weights = weights;
@@ -415,9 +415,9 @@ void check_weights(const Report& report) {
   for (const char* scene : kStudyScenes) {
     Study study(scene, settings);
     const SeenImage seen(*study.world, settings);
-    const std::vector<double> bounded = variances(study, seen, settings, IndirectWeights::kDistanceBounded);
-    const Estimate in_box = ratio_of_means(variances(study, seen, settings, IndirectWeights::kInBox), bounded);
-    const Estimate yuksel = ratio_of_means(variances(study, seen, settings, IndirectWeights::kYuksel), bounded);
+    const std::vector<double> bounded = variances(study, seen, settings, Weights::kDistanceBounded);
+    const Estimate in_box = ratio_of_means(variances(study, seen, settings, Weights::kInBox), bounded);
+    const Estimate yuksel = ratio_of_means(variances(study, seen, settings, Weights::kYuksel), bounded);
     report(
         {9, scene, "variance to leaves: in-box rule / distance-bounded", "above 1", in_box.value, in_box.error, 1, {}});
     report({9,

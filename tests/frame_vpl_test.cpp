@@ -64,7 +64,7 @@ TEST(FrameVpl, EveryPresetHasTheMeanOfAllLights) {
   Settings slc = room_view("slc"), sst = room_view("sst"), corrected = sst, uniform = sst;
   corrected.indirect.correction = 0.25f;
   uniform.indirect.selection = Selection::kUniform;
-  uniform.indirect.hierarchy = IndirectHierarchy::kNone;
+  uniform.indirect.hierarchy = Hierarchy::kNone;
   for (Settings* settings : {&slc, &corrected, &uniform}) {
     settings->spp = 150;
     const ImageMean found = indirect_mean(*settings);
@@ -217,8 +217,7 @@ TEST(FrameVpl, ShowAddsALayerOfTheWalks) {
 }
 
 TEST(FrameVpl, ScalingTheSceneChangesNoPixel) {
-  for (const IndirectWeights weight :
-       {IndirectWeights::kDistanceBounded, IndirectWeights::kInBox, IndirectWeights::kYuksel}) {
+  for (const Weights weight : {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel}) {
     for (const bool leaf : {false, true}) {
       SCOPED_TRACE(std::to_string(static_cast<int>(weight)) + (leaf ? ", leaf" : ", substitute"));
       const auto render_scaled = [&](float factor) {
@@ -273,7 +272,7 @@ void expect_refused(const Settings& settings, const std::string& word) {
 TEST(FrameVpl, CombinationsWithoutSenseAreRefused) {
   Settings settings = make_preset("sst");
   EXPECT_NO_THROW(check(settings));
-  settings.indirect.hierarchy = IndirectHierarchy::kNone;
+  settings.indirect.hierarchy = Hierarchy::kNone;
   expect_refused(settings, "indirect.hierarchy");
   EXPECT_THROW(render(small_room(), settings), Error);
   settings.indirect.selection = Selection::kPower;
@@ -287,7 +286,7 @@ TEST(FrameVpl, CombinationsWithoutSenseAreRefused) {
   settings.indirect.stop = Stop::kSubstitute;
   EXPECT_NO_THROW(check(settings));
   settings.indirect.transport = Transport::kPath;  // says nothing of lights that are not traced
-  settings.indirect.hierarchy = IndirectHierarchy::kNone;
+  settings.indirect.hierarchy = Hierarchy::kNone;
   EXPECT_NO_THROW(check(settings));
 }
 

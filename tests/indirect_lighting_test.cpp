@@ -173,12 +173,11 @@ TEST(IndirectLighting, MeanOfWalksToLeavesIsTheSumOfAll) {
     const std::vector<vec3> truth = sum_of_all(room, surfaces, gloss);
     for (const Topology topology : {Topology::kRadix, Topology::kPerfect}) {
       room.build(topology);
-      for (const IndirectWeights weight :
-           {IndirectWeights::kDistanceBounded, IndirectWeights::kInBox, IndirectWeights::kYuksel}) {
+      for (const Weights weight : {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel}) {
         IndirectLighting lighting = room.lighting(Selection::kRoot);
         lighting.sampler.gloss = gloss;
         lighting.sampler.walk.weight = weight;
-        lighting.sampler.walk.cones = weight != IndirectWeights::kInBox;
+        lighting.sampler.walk.cones = weight != Weights::kInBox;
         SCOPED_TRACE((topology == Topology::kRadix ? "radix, weight " : "perfect, weight ") +
                      std::to_string(static_cast<int>(weight)) + (gloss ? ", gloss" : ""));
         expect_means(means_of(lighting, surfaces, kSamples), truth);

@@ -87,7 +87,7 @@ class VplTree {
 
   VplView lights() const { return {vpls_, bounds_, 10}; }
   SubstituteTreeView view() const { return tree_.view(); }
-  SubstituteWalk walk(IndirectWeights weight, bool cones = false, bool substitutes = false) const {
+  SubstituteWalk walk(Weights weight, bool cones = false, bool substitutes = false) const {
     return {tree_.view(), weight, 0.01f, cones, substitutes, 4};
   }
 

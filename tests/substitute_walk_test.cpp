@@ -17,20 +17,19 @@ using namespace lumigrove::testing;
 
 struct Config {
   Topology topology;
-  IndirectWeights weight;
+  Weights weight;
   bool cones, gloss, substitutes;
 };
 
 std::string name_of(const Config& c) {
-  static constexpr const char* kWeights[] = {"distance-bounded", "in-box", "yuksel"};
-  return std::string(c.topology == Topology::kRadix ? "radix, " : "perfect, ") + kWeights[static_cast<int>(c.weight)] +
+  const char* weight = c.weight == Weights::kYuksel ? "yuksel" : c.weight == Weights::kInBox ? "in-box" : "distance-bounded";
+  return std::string(c.topology == Topology::kRadix ? "radix, " : "perfect, ") + weight +
          (c.cones ? ", cones" : "") + (c.gloss ? ", gloss" : "") + (c.substitutes ? ", substitutes" : "");
 }
 
 std::vector<Config> configs(Topology topology, bool substitutes = false) {
   std::vector<Config> all;
-  for (const IndirectWeights weight :
-       {IndirectWeights::kDistanceBounded, IndirectWeights::kInBox, IndirectWeights::kYuksel})
+  for (const Weights weight : {Weights::kDistanceBounded, Weights::kInBox, Weights::kYuksel})
     for (const bool cones : {false, true})
       for (const bool gloss : {false, true})
         if (!(gloss && substitutes)) all.push_back({topology, weight, cones, gloss, substitutes});
@@ -242,7 +241,7 @@ TEST(SubstituteWalk, FrequenciesOfSubstitutesFollowTheirProbabilities) { expect_
 TEST(SubstituteWalk, FrequenciesOverManyStepsFollowTheirProbabilities) {
   for (const Topology topology : {Topology::kRadix, Topology::kPerfect}) {
     const VplTree tree(cloud(5000).vpls, topology);
-    const SubstituteWalk walk = tree.walk(IndirectWeights::kDistanceBounded);
+    const SubstituteWalk walk = tree.walk(Weights::kDistanceBounded);
     Stream random(5);
     for (const Surface& surface : walk_surfaces(3)) {
       SubstituteWalkPoints one;
@@ -531,8 +530,8 @@ struct Oracle {
     const double floor2 = static_cast<double>(walk.floor2), inside2 = static_cast<double>(walk.inside2);
     const auto by_rule = [&](const Value& v) {
       switch (walk.weight) {
-        case IndirectWeights::kDistanceBounded: return std::max(v.mean2, floor2);
-        case IndirectWeights::kInBox: return v.near2 > 0 ? std::max(v.mean2, floor2) : inside2;
+        case Weights::kDistanceBounded: return std::max(v.mean2, floor2);
+        case Weights::kInBox: return v.near2 > 0 ? std::max(v.mean2, floor2) : inside2;
         default: break;
       }
       const bool wide = a.diagonal2 > a.near2 || b.diagonal2 > b.near2;
@@ -540,7 +539,7 @@ struct Oracle {
     };
     certain = a.certain && b.certain;
     for (const Value& v : {a, b})
-      if (walk.weight == IndirectWeights::kYuksel && std::abs(v.diagonal2 - v.near2) < 1e-4 * v.diagonal2)
+      if (walk.weight == Weights::kYuksel && std::abs(v.diagonal2 - v.near2) < 1e-4 * v.diagonal2)
         certain = false;
     return {a.shine / by_rule(a), b.shine / by_rule(b)};
   }
@@ -755,9 +754,9 @@ TEST(SubstituteWalk, NoLightIsDeadAndOneLightIsCertain) {
   std::array<WalkResult, kSubstituteWalks> results;
   for (const bool gloss : {false, true}) {
     for (const bool substitutes : {false, true}) {
-      walk_all(none.walk(IndirectWeights::kInBox, false, substitutes), gloss, points, 9, results.data());
+      walk_all(none.walk(Weights::kInBox, false, substitutes), gloss, points, 9, results.data());
       for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(results[i].end, WalkEnd::kDead);
-      walk_all(one.walk(IndirectWeights::kInBox, false, substitutes), gloss, points, 9, results.data());
+      walk_all(one.walk(Weights::kInBox, false, substitutes), gloss, points, 9, results.data());
       for (std::size_t i = 0; i < 9; ++i) {
         EXPECT_EQ(results[i].end, WalkEnd::kLeaf);
         EXPECT_EQ(results[i].node, 0u);
@@ -770,7 +769,7 @@ TEST(SubstituteWalk, NoLightIsDeadAndOneLightIsCertain) {
 
 TEST(SubstituteWalk, SubstitutesHoldTheirLightsInTheirBox) {
   const VplTree tree(two_walls(400).vpls);
-  const SubstituteWalk walk = tree.walk(IndirectWeights::kDistanceBounded, false, true);
+  const SubstituteWalk walk = tree.walk(Weights::kDistanceBounded, false, true);
   // First and last leaf below every inner node.
   const auto edge = [&](std::uint32_t node, int side) {
     for (;;) {

@@ -64,7 +64,7 @@ std::vector<EmitterGroup> group_emitters(const Scene& scene, const SceneState& s
   EmitterGroup triangles{"triangle"}, points{"point"}, spots{"spot"};
   for (std::uint32_t i = 0; i < view.emitters.size(); ++i) {
     const Emitter& emitter = view.emitters[i];
-    const bool spot = emitter.punctual() && view.punctual[emitter.source & ~Emitter::kPunctual].spot;
+    const bool spot = emitter.punctual() && view.punctual[emitter.index()].spot;
     EmitterGroup& group = !emitter.punctual() ? triangles : spot ? spots : points;
     ++group.count;
     group.flux += emitter_flux(view, i);

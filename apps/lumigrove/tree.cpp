@@ -62,7 +62,9 @@ Settings make_tree_settings(const TreeOptions& options) {
   if (!options.overlay.empty() && !gives(given, "spp")) given.values.emplace_back("spp", "4");
   Settings settings = make_settings(given);
   if (!options.time.empty()) set_value(settings, "time", options.time);
-  if (settings.indirect.transport != Transport::kVpl || settings.indirect.selection != Selection::kRoot)
+  const IndirectSettings& indirect = settings.indirect;
+  if (indirect.transport != Transport::kVpl || indirect.joint || indirect.selection != Selection::kRoot ||
+      indirect.hierarchy != Hierarchy::kSubstitute)
     throw Error(fmt::format("this explains the substitute tree, but '{}' walks none; use --preset sst or slc",
                             settings.preset));
   const bool needs_substitutes = options.overlay == "ellipses" || options.overlay == "size";

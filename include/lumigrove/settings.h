@@ -15,39 +15,48 @@
 namespace lumigrove {
 
 // The axes of the space of methods (docs/papers.md); the table in registry.cpp holds their names.
-enum class Hierarchy : std::uint8_t { kNone, kPerfect, kTwoLevel, kSaoh, kAgglomerative };
-enum class Weights : std::uint8_t { kMinMax, kSaoh, kYuksel };
+enum class Hierarchy : std::uint8_t { kNone, kPerfect, kTwoLevel, kSaoh, kAgglomerative, kSubstitute };
+enum class Weights : std::uint8_t { kMinMax, kSaoh, kYuksel, kDistanceBounded, kInBox };
 enum class Selection : std::uint8_t { kUniform, kPower, kRoot, kAll, kCut, kPool };
 enum class CutBound : std::uint8_t { kNearest, kExact, kChildren };
 enum class Transport : std::uint8_t { kNone, kPath, kVpl };
-enum class IndirectHierarchy : std::uint8_t { kNone, kSubstitute };
 enum class Topology : std::uint8_t { kRadix, kPerfect };
-enum class IndirectWeights : std::uint8_t { kDistanceBounded, kInBox, kYuksel };
 enum class Stop : std::uint8_t { kLeaf, kSubstitute };
 
-// Light that reaches a surface straight from an emitter.
-struct DirectSettings {
+// How lights are chosen, and what they are chosen from.
+struct SelectionSettings {
   Selection selection = Selection::kRoot;
-  Hierarchy hierarchy = Hierarchy::kPerfect;  // needed by kRoot
+  Hierarchy hierarchy = Hierarchy::kPerfect;  // needed by kRoot and kCut
   Weights weights = Weights::kMinMax;
-  int width = 16;               // children a node: 2 (as the paper), 4, 8, 16
-  bool cones = true;            // weights bound the emitters' own cosine (the paper's do not)
+  int width = 16;               // kPerfect, kTwoLevel: children a node: 2 (as the paper), 4, 8, 16
+  bool cones = true;            // weights bound the lights' own cosine (the paper's do not)
   int spp = 1;                  // light samples for each camera sample
-  bool mis = false;             // combine with BSDF sampling (balance heuristic)
   // Cuts (kCut): spp is the number of a cut's nodes, at most 32, each sampled once
   int cut_share = 8;            // k: blocks of k x k pixels share a cut; 1 = a cut for every pixel
   int cut_interleave = 1;       // m: the pixels of m x m share out a cut's nodes
   float cut_floor = 0.001f;     // least distance in the bound, in units of the diagonal of the lights' box
   CutBound cut_bound = CutBound::kChildren;
-  // Pools (kPool): lights are drawn for every cut_share x cut_share pixels, each of which takes spp of them
-  int pool = 64;                // lights of a pool: 16, 32, 48, 64
   // Adaptive tree splitting (kSaoh, kAgglomerative)
   float split = 0;              // threshold: one sample below each part of a split tree; 0 = no splitting
   int split_cap = 16;           // most parts, at most 64
 };
 
-// Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D.
-struct IndirectSettings {
+// Light that reaches a surface straight from an emitter.
+struct DirectSettings : SelectionSettings {
+  bool mis = false;             // combine with BSDF sampling (balance heuristic)
+  // Pools (kPool): lights are drawn for every cut_share x cut_share pixels, each of which takes spp of them
+  int pool = 64;                // lights of a pool: 16, 32, 48, 64
+};
+
+// Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D. The selection is among
+// virtual point lights (kVpl).
+struct IndirectSettings : SelectionSettings {
+  IndirectSettings() {
+    hierarchy = Hierarchy::kSubstitute;
+    weights = Weights::kDistanceBounded;
+    cones = false;
+  }
+
   Transport transport = Transport::kNone;
   int max_bounces = 4;          // kPath: indirect bounces; 0 = none
   int roulette_start = 3;       // first bounce that Russian roulette may end
@@ -56,25 +65,20 @@ struct IndirectSettings {
   int bounces = 3;              // lights that one path leaves at most; 1 = first bounce only
   bool keep_vpls = false;       // the same lights for every camera sample; otherwise new ones for each
   float clamp = 215;            // G_max: most of cos / d^2, in units of 1 / D^2; 0 = no clamp
-  // How they are chosen
-  Selection selection = Selection::kRoot;
-  IndirectHierarchy hierarchy = IndirectHierarchy::kSubstitute;  // needed by kRoot
+  bool gloss = true;            // gloss lobes are lit too
+  bool joint = false;           // emitters and virtual point lights are one set, chosen from as DirectSettings say
+  // The substitute tree (kSubstitute)
   Topology topology = Topology::kRadix;
-  IndirectWeights weights = IndirectWeights::kDistanceBounded;
   float distance_floor = 0.048f;  // epsilon: least distance in the weights, kDistanceBounded
-  bool cones = false;           // weights also bound the cosine at the lights
-  bool gloss = true;            // gloss lobes are lit too, by walks of their own
-  int spp = 1;                  // samples for each camera sample
-  // Substitutes
   Stop stop = Stop::kSubstitute;
   float min_nu = 0.5f;          // nu_min: least agreement of normals
   float max_sigma = 0.0216f;    // sigma_max: most deviation along the normal
   float max_diagonal = 0;       // tau_max: most diagonal of the lights' box; 0 = any
   float correction = 0;         // probability of correcting a substitute by a leaf; above 0: no bias
+  bool show = false;            // layers that show the walks
   // Beyond the trees
   float mirror_roughness = 0;   // gloss of surfaces at most this rough goes on by one ray; 0 = none
   bool compensate = false;      // light lost to the clamp is found by one short ray
-  bool show = false;            // layers that show the walks
 };
 
 struct ViewSettings {           // replaces the scene's camera when set (Embree's names)

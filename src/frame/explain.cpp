@@ -149,7 +149,7 @@ struct RelativeWeights {
 // Equation (5) of child `side`: what it divides by is what the other child's relative weight was multiplied with.
 float weight_of(const SubstituteWalk& walk, const RelativeWeights& relative, const float* shine, const float* mean2,
                 int side) {
-  if (walk.weight == IndirectWeights::kDistanceBounded) return shine[side] / std::max(mean2[side], walk.floor2);
+  if (walk.weight == Weights::kDistanceBounded) return shine[side] / std::max(mean2[side], walk.floor2);
   const int other = 1 - side;
   return shine[side] * shine[other] / relative.value[other];  // NaN if the other child cannot be taken
 }

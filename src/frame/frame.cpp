@@ -91,13 +91,13 @@ PathTracing make_path_tracing(const Settings& settings, const DirectLighting& di
 Gather make_gather(const Settings& settings, const DirectLighting& direct, const IndirectLighting& indirect) {
   Gather gather{away_from_camera(direct), indirect, settings.indirect.compensate, settings.force_diffuse};
   gather.direct.mis = false;
+  gather.indirect.light_tree = away_from_camera(indirect.light_tree);
   return gather;
 }
 
 // G-buffer · direct light · indirect light · film, for the pixels of one tile.
-void light_tile(const World& world, const Settings& settings, const DirectLighting& direct,
-                const IndirectLighting& indirect, const CameraView& camera, const PixelWindow& tile, int sample,
-                TileBuffers& b, Film& film) {
+void light_tile(const World& world, const Settings& settings, DirectLighting direct, IndirectLighting indirect,
+                const CameraView& camera, const PixelWindow& tile, int sample, TileBuffers& b, Film& film) {
   const int count = tile.count();
   const std::size_t n = static_cast<std::size_t>(count);
   const SceneView scene = world.arrays.view();
@@ -122,10 +122,10 @@ void light_tile(const World& world, const Settings& settings, const DirectLighti
     launch(count, EmissionKernel{scene, lights, settings.light_scale, b.rays, b.surfaces, b.emission});
   });
 
-  DirectLighting of_tile = direct;
-  of_tile.lookup.window = of_tile.pools.areas.window = tile;
-  add_direct_light(of_tile, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
-  add_path_light(make_path_tracing(settings, of_tile, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,
+  direct.lookup.window = direct.pools.areas.window = indirect.light_tree.lookup.window = tile;
+  b.direct_buffers.vpl_sum = settings.indirect.joint ? std::span<vec3>(b.indirect) : std::span<vec3>();
+  add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
+  add_path_light(make_path_tracing(settings, direct, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,
                  b.direct, b.indirect);
   if (settings.indirect.transport == Transport::kVpl) {
     b.indirect_buffers.wants_traces = !film.walks.empty();
@@ -192,22 +192,38 @@ constexpr float kSubstituteOffset = 2.2e-3f;
 // Distance that stands for none where kInBox leaves it out, in units of D.
 constexpr float kInsideDistance = 0.2155f;
 
-bool uses_bvh(const DirectSettings& s) {
+bool uses_bvh(const SelectionSettings& s) {
   return (s.selection == Selection::kRoot || s.selection == Selection::kCut) &&
          (s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative);
 }
 
-void build_light_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
-  const LightTree::Options options{settings.width, settings.cones, settings.mis, settings.weights};
-  if (settings.hierarchy != Hierarchy::kTwoLevel) {
-    world.tree.build(world.lights.view(), options);
-    stats.structures.push_back(
-        {"perfect tree", world.tree.build_ms(), world.tree.bytes(), world.tree.view().count});
-    return;
+bool uses_tree(const SelectionSettings& s) {
+  return (s.selection == Selection::kRoot || s.selection == Selection::kCut || s.selection == Selection::kPool) &&
+         (s.hierarchy == Hierarchy::kPerfect || s.hierarchy == Hierarchy::kTwoLevel);
+}
+
+// Are VPLs chosen from a light tree of their own?
+bool uses_vpl_light_tree(const IndirectSettings& s) {
+  return s.transport == Transport::kVpl && !s.joint && (uses_tree(s) || uses_bvh(s));
+}
+
+// One tree over all lights of `lights`: a perfect one or a BVH. `floor`: least distance in the weights, metres.
+StructureStats build_light_tree(const LightView& lights, const SelectionSettings& settings, bool keep_leaves,
+                                float floor, LightTree& tree, LightBvh& bvh) {
+  if (!uses_bvh(settings)) {
+    tree.build(lights, {settings.width, settings.cones, keep_leaves, settings.weights, floor});
+    return {"perfect tree", tree.build_ms(), tree.bytes(), tree.view().count};
   }
+  bvh.build(lights, {settings.hierarchy, settings.weights, settings.cones, floor});
+  return {settings.hierarchy == Hierarchy::kSaoh ? "SAOH tree" : "agglomerative tree", bvh.build_ms(), bvh.bytes(),
+          bvh.view().count};
+}
+
+void build_two_level_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
   TwoLevelTree& tree = world.two_level;
   const int meshes = tree.meshes_built();
-  tree.build(world.arrays.view(), world.lights.view(), options);
+  tree.build(world.arrays.view(), world.lights.view(),
+             {settings.width, settings.cones, settings.mis, settings.weights});
   if (tree.meshes_built() > meshes)
     stats.structures.push_back({"bottom trees", tree.mesh_ms(), tree.mesh_bytes(), tree.mesh_triangles()});
   stats.structures.push_back({"two-level tree", tree.build_ms(), tree.bytes(), tree.top().view().count});
@@ -221,6 +237,80 @@ StructureStats build_alias_table(AliasTable& table, const char* name, std::size_
   launch(static_cast<int>(count), [&](int i) { weights[static_cast<std::size_t>(i)] = weight_of(i); });
   table.build(weights);
   return {name, watch.ms(), table.bytes(), count};
+}
+
+// Over the flux of all emitters of `lights`.
+StructureStats build_alias_table(AliasTable& table, const LightView& lights) {
+  return build_alias_table(table, "alias table", lights.emitters.size(),
+                           [&](int i) { return emitter_flux(lights, static_cast<std::uint32_t>(i)); });
+}
+
+// G_max, 1/m^2.
+float vpl_clamp(const IndirectSettings& s, float diagonal) {
+  return s.clamp > 0 ? s.clamp / (diagonal * diagonal) : kInfinity;
+}
+
+// Structures over virtual point lights, which have a line of their own in the statistics.
+void set_vpl_structure(RenderStats& stats, const std::string& kind, StructureStats structure) {
+  structure.name = kind + " " + structure.name;
+  structure.of_vpls = true;
+  set_structure(stats, structure);
+}
+
+// How samples of the lights are taken: of `tree`, `bvh` or the table that the sampler has.
+void set_selection(const SelectionSettings& settings, const Settings& frame, int sample, DirectLighting& lighting) {
+  LightSampler& sampler = lighting.sampler;
+  const bool bvh = uses_bvh(settings);
+  switch (settings.selection) {
+    case Selection::kUniform:
+      sampler.choice = LightChoice::kUniform;
+      break;
+    case Selection::kPower:
+      sampler.choice = LightChoice::kPower;
+      break;
+    case Selection::kRoot:
+      sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
+      lighting.use_split = bvh && settings.split > 0;
+      lighting.split = {settings.split, settings.split_cap};
+      break;
+    case Selection::kCut: {
+      sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
+      lighting.use_cuts = true;
+      const float floor = settings.cut_floor * sampler.lights.bounds.diagonal();
+      const float floor2 = bvh ? sampler.bvh.floor2 : sampler.tree.floor2;
+      lighting.cut = {settings.spp, std::max(floor * floor, floor2), settings.cut_bound};
+      lighting.lookup.share = settings.cut_share;
+      lighting.lookup.interleave = settings.cut_interleave;
+      lighting.lookup.frame = static_cast<std::uint32_t>(frame.frame) + static_cast<std::uint32_t>(sample);
+      break;
+    }
+    case Selection::kPool:
+      sampler.choice = LightChoice::kTree;
+      lighting.use_pools = true;
+      lighting.pools.interleave = settings.cut_interleave;
+      lighting.pools.areas.share = settings.cut_share * settings.cut_interleave;
+      lighting.pools.areas.frame = static_cast<std::uint32_t>(frame.frame) + static_cast<std::uint32_t>(sample);
+      break;
+    case Selection::kAll:
+      lighting.all = true;
+      break;
+  }
+  lighting.rng = frame_rng(frame, sample);
+  lighting.spp = settings.spp;
+}
+
+// The sampler that settings.indirect asks for over the virtual point lights as emitters.
+DirectLighting make_vpl_light_tree_lighting(const World& world, const Settings& settings, int sample) {
+  DirectLighting lighting;
+  lighting.sampler.scene = world.arrays.view();
+  lighting.sampler.lights = world.vpl_lights.view();
+  lighting.sampler.tree = world.vpl_tree.view();
+  lighting.sampler.bvh = world.vpl_bvh.view();
+  lighting.sampler.vpl_gloss = settings.indirect.gloss;
+  lighting.sampler.vpl_mirror_roughness = settings.indirect.mirror_roughness;
+  lighting.tracer = &world.tracer;
+  set_selection(settings.indirect, settings, sample, lighting);
+  return lighting;
 }
 
 }  // namespace
@@ -242,7 +332,7 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
   CameraInstance camera = resolve_camera(scene, state, settings);
   auto world = std::make_unique<World>(World{
       std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, std::move(known.two_level), {}, {},
-      std::move(camera), known.texture_key, known.shape_key, {}, {}, {}});
+      std::move(camera), known.texture_key, known.shape_key, {}, {}, {}, {}, {}, {}});
   build_lights(*world, settings, stats);
   return world;
 }
@@ -260,21 +350,61 @@ void build_lights(World& world, const Settings& settings, RenderStats& stats) {
   stats.emitters = lights.emitters.size();
   stats.structures.push_back(
       {"light set", world.lights.gather_ms(), world.lights.bytes(), lights.emitters.size()});
-  if (uses_bvh(settings.direct)) {
-    const Hierarchy builder = settings.direct.hierarchy;
-    world.bvh.build(lights, {builder, settings.direct.weights, settings.direct.cones});
-    stats.structures.push_back({builder == Hierarchy::kSaoh ? "SAOH tree" : "agglomerative tree", world.bvh.build_ms(),
-                                world.bvh.bytes(), world.bvh.view().count});
-  } else if (settings.direct.selection == Selection::kRoot || settings.direct.selection == Selection::kCut ||
-             settings.direct.selection == Selection::kPool) {
-    build_light_tree(world, settings.direct, stats);
-  }
-  if (settings.direct.selection == Selection::kPower) {
-    stats.structures.push_back(build_alias_table(world.alias, "alias table", lights.emitters.size(), [&](int i) {
-      return emitter_flux(lights, static_cast<std::uint32_t>(i));
-    }));
+  if (settings.indirect.joint) return;
+  const DirectSettings& direct = settings.direct;
+  if (uses_tree(direct) && direct.hierarchy == Hierarchy::kTwoLevel)
+    build_two_level_tree(world, direct, stats);
+  else if (uses_tree(direct) || uses_bvh(direct))
+    stats.structures.push_back(build_light_tree(lights, direct, direct.mis, 0, world.tree, world.bvh));
+  if (direct.selection == Selection::kPower) stats.structures.push_back(build_alias_table(world.alias, lights));
+}
+
+namespace {
+
+// What chooses among the virtual point lights alone.
+void build_vpl_structures(World& world, const IndirectSettings& indirect, RenderStats& stats) {
+  const VplView vpls = world.vpls.view();
+  const float d = vpls.diagonal;
+  if (uses_vpl_light_tree(indirect)) {
+    world.vpl_lights.gather(vpls, vpl_clamp(indirect, d));
+    set_vpl_structure(stats, "VPL",
+                      {"light set", world.vpl_lights.gather_ms(), world.vpl_lights.bytes(), vpls.vpls.size()});
+    StructureStats tree = build_light_tree(world.vpl_lights.view(), indirect, false, indirect.distance_floor * d,
+                                           world.vpl_tree, world.vpl_bvh);
+    if (indirect.hierarchy == Hierarchy::kPerfect) tree.name = "light tree";
+    set_vpl_structure(stats, "VPL", tree);
+  } else if (indirect.selection == Selection::kRoot) {
+    world.substitutes.build(vpls, {indirect.topology, indirect.min_nu, indirect.max_sigma * d,
+                                   indirect.max_diagonal > 0 ? indirect.max_diagonal * d : kInfinity});
+    set_structure(stats, {"substitute tree", world.substitutes.build_ms(), world.substitutes.bytes(),
+                          world.substitutes.view().count, true});
+  } else if (indirect.selection == Selection::kPower) {
+    set_vpl_structure(stats, "VPL",
+                      build_alias_table(world.vpl_alias, "alias table", vpls.vpls.size(), [&](int i) {
+                        return luminance(vpls.vpls[static_cast<std::size_t>(i)].intensity);
+                      }));
   }
 }
+
+// What chooses among emitters and virtual point lights as one set.
+void build_joint_structures(World& world, const Settings& settings, RenderStats& stats) {
+  const DirectSettings& direct = settings.direct;
+  const VplView vpls = world.vpls.view();
+  world.vpl_lights.gather_behind(world.lights.view(), vpls, vpl_clamp(settings.indirect, vpls.diagonal));
+  const LightView lights = world.vpl_lights.view();
+  set_vpl_structure(stats, "joint",
+                    {"light set", world.vpl_lights.gather_ms(), world.vpl_lights.bytes(), lights.emitters.size()});
+  if (uses_tree(direct) || uses_bvh(direct)) {
+    const float floor = settings.indirect.distance_floor * vpls.diagonal;
+    StructureStats tree = build_light_tree(lights, direct, direct.mis, floor, world.tree, world.bvh);
+    if (direct.hierarchy == Hierarchy::kPerfect) tree.name = "light tree";
+    set_vpl_structure(stats, "joint", tree);
+  }
+  if (direct.selection == Selection::kPower)
+    set_vpl_structure(stats, "joint", build_alias_table(world.alias, lights));
+}
+
+}  // namespace
 
 void trace_vpls(World& world, const Settings& settings, int sample, RenderStats& stats) {
   const IndirectSettings& indirect = settings.indirect;
@@ -293,20 +423,10 @@ void trace_vpls(World& world, const Settings& settings, int sample, RenderStats&
   const VplView vpls = world.vpls.view();
   add_pass_ms(stats, "VPL paths", world.vpls.trace_ms(), world.vpls.rays());
   set_structure(stats, {"VPLs", world.vpls.trace_ms(), world.vpls.bytes(), vpls.vpls.size(), true});
-  if (indirect.selection == Selection::kRoot) {
-    const float d = vpls.diagonal;
-    world.substitutes.build(vpls, {indirect.topology, indirect.min_nu, indirect.max_sigma * d,
-                                   indirect.max_diagonal > 0 ? indirect.max_diagonal * d : kInfinity});
-    set_structure(stats, {"substitute tree", world.substitutes.build_ms(), world.substitutes.bytes(),
-                          world.substitutes.view().count, true});
-  }
-  if (indirect.selection == Selection::kPower) {
-    StructureStats table = build_alias_table(world.vpl_alias, "VPL alias table", vpls.vpls.size(), [&](int i) {
-      return luminance(vpls.vpls[static_cast<std::size_t>(i)].intensity);
-    });
-    table.of_vpls = true;
-    set_structure(stats, table);
-  }
+  if (indirect.joint)
+    build_joint_structures(world, settings, stats);
+  else
+    build_vpl_structures(world, indirect, stats);
 }
 
 IndirectLighting make_indirect_lighting(const World& world, const Settings& settings, int sample) {
@@ -314,8 +434,9 @@ IndirectLighting make_indirect_lighting(const World& world, const Settings& sett
   IndirectLighting indirect;
   if (s.transport != Transport::kVpl) return indirect;
   VplSampler& sampler = indirect.sampler;
-  sampler.lights = world.vpls.view();
-  const float d = sampler.lights.diagonal;
+  const VplView vpls = world.vpls.view();
+  const float d = vpls.diagonal;
+  if (!s.joint) sampler.lights = vpls;
   sampler.alias = world.vpl_alias.view();
   sampler.walk.tree = world.substitutes.view();
   sampler.walk.weight = s.weights;
@@ -326,12 +447,14 @@ IndirectLighting make_indirect_lighting(const World& world, const Settings& sett
   sampler.choice = s.selection == Selection::kRoot    ? VplChoice::kTree
                    : s.selection == Selection::kPower ? VplChoice::kPower
                                                       : VplChoice::kUniform;
-  sampler.clamp = s.clamp > 0 ? s.clamp / (d * d) : kInfinity;
+  sampler.clamp = vpl_clamp(s, d);
   sampler.substitute_offset = kSubstituteOffset * d;
   sampler.correction = s.correction;
   sampler.gloss = s.gloss;
   sampler.mirror_roughness = s.mirror_roughness;
   indirect.all = s.selection == Selection::kAll;
+  indirect.use_light_tree = uses_vpl_light_tree(s);
+  if (indirect.use_light_tree) indirect.light_tree = make_vpl_light_tree_lighting(world, settings, sample);
   indirect.tracer = &world.tracer;
   indirect.rng = frame_rng(settings, sample);
   indirect.spp = s.spp;
@@ -340,53 +463,20 @@ IndirectLighting make_indirect_lighting(const World& world, const Settings& sett
 
 DirectLighting make_direct_lighting(const World& world, const Settings& settings, int sample) {
   DirectLighting direct;
-  direct.sampler.scene = world.arrays.view();
-  direct.sampler.lights = world.lights.view();
-  direct.sampler.alias = world.alias.view();
+  LightSampler& sampler = direct.sampler;
+  sampler.scene = world.arrays.view();
+  sampler.lights = settings.indirect.joint ? world.vpl_lights.view() : world.lights.view();
+  sampler.vpl_gloss = settings.indirect.gloss;
+  sampler.vpl_mirror_roughness = settings.indirect.mirror_roughness;
+  sampler.alias = world.alias.view();
   const bool two_level = settings.direct.hierarchy == Hierarchy::kTwoLevel;
-  direct.sampler.tree = two_level ? world.two_level.top().view() : world.tree.view();
-  if (two_level) direct.sampler.mesh_trees = world.two_level.view();
-  direct.sampler.bvh = world.bvh.view();
-  const bool bvh = uses_bvh(settings.direct);
-  switch (settings.direct.selection) {
-    case Selection::kUniform:
-      direct.sampler.choice = LightChoice::kUniform;
-      break;
-    case Selection::kPower:
-      direct.sampler.choice = LightChoice::kPower;
-      break;
-    case Selection::kRoot:
-      direct.sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
-      direct.use_split = bvh && settings.direct.split > 0;
-      direct.split = {settings.direct.split, settings.direct.split_cap};
-      break;
-    case Selection::kCut: {
-      direct.sampler.choice = bvh ? LightChoice::kBvh : LightChoice::kTree;
-      direct.use_cuts = true;
-      const float floor = settings.direct.cut_floor * direct.sampler.lights.bounds.diagonal();
-      const float inside2 = bvh ? direct.sampler.bvh.inside2 : direct.sampler.tree.inside2;
-      direct.cut = {settings.direct.spp, std::max(floor * floor, inside2), settings.direct.cut_bound};
-      direct.lookup.share = settings.direct.cut_share;
-      direct.lookup.interleave = settings.direct.cut_interleave;
-      direct.lookup.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
-      break;
-    }
-    case Selection::kPool:
-      direct.sampler.choice = LightChoice::kTree;
-      direct.use_pools = true;
-      direct.pools.size = settings.direct.pool;
-      direct.pools.interleave = settings.direct.cut_interleave;
-      direct.pools.areas.share = settings.direct.cut_share * settings.direct.cut_interleave;
-      direct.pools.areas.frame = static_cast<std::uint32_t>(settings.frame) + static_cast<std::uint32_t>(sample);
-      break;
-    case Selection::kAll:
-      direct.all = true;
-      break;
-  }
+  sampler.tree = two_level ? world.two_level.top().view() : world.tree.view();
+  if (two_level) sampler.mesh_trees = world.two_level.view();
+  sampler.bvh = world.bvh.view();
   direct.tracer = &world.tracer;
-  direct.rng = frame_rng(settings, sample);
-  direct.spp = settings.direct.spp;
   direct.mis = settings.direct.mis;
+  direct.pools.size = settings.direct.pool;
+  set_selection(settings.direct, settings, sample, direct);
   return direct;
 }
 
@@ -418,12 +508,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     sum.surface_ms += b.surface_ms;
     sum.film_ms += b.film_ms;
     sum.primary_rays += b.primary_rays;
-    sum.direct_buffers.cut_ms += b.direct_buffers.cut_ms;
-    sum.direct_buffers.pool_ms += b.direct_buffers.pool_ms;
-    sum.direct_buffers.split_ms += b.direct_buffers.split_ms;
-    sum.direct_buffers.select_ms += b.direct_buffers.select_ms;
-    sum.direct_buffers.trace_ms += b.direct_buffers.trace_ms;
-    sum.direct_buffers.rays += b.direct_buffers.rays;
+    sum.direct_buffers.add_counters(b.direct_buffers);
     sum.path_buffers.add_counters(b.path_buffers);
     sum.indirect_buffers.add_counters(b.indirect_buffers);
     sum.gather_buffers.add_counters(b.gather_buffers);
@@ -444,8 +529,13 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
     add_pass(stats, "path shadow rays", path.direct.trace_ms, path.direct.rays);
   }
   if (settings.indirect.transport == Transport::kVpl) {
-    add_pass(stats, "VPL selection", sum.indirect_buffers.select_ms, 0);
-    add_pass(stats, "VPL shadow rays", sum.indirect_buffers.trace_ms, sum.indirect_buffers.rays);
+    const IndirectBuffers& vpls = sum.indirect_buffers;
+    if (indirect.light_tree.use_split) add_pass(stats, "VPL splitting", vpls.light_tree.split_ms, 0);
+    if (indirect.light_tree.use_cuts) add_pass(stats, "VPL cuts", vpls.light_tree.cut_ms, 0);
+    if (!settings.indirect.joint) {
+      add_pass(stats, "VPL selection", vpls.select_ms, 0);
+      add_pass(stats, "VPL shadow rays", vpls.trace_ms, vpls.rays);
+    }
     if (sum.gather_buffers.rays_traced > 0) add_gather_passes(stats, sum.gather_buffers);
   }
   add_pass(stats, "film", sum.film_ms, 0);

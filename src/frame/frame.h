@@ -6,9 +6,10 @@
 
 #include "frame/film.h"
 #include "frame/history.h"
-#include "lights/light_set.h"
-#include "lumigrove/renderer.h"
 #include "lights/alias_table.h"
+#include "lights/light_set.h"
+#include "lights/vpl_light_set.h"
+#include "lumigrove/renderer.h"
 #include "methods/light_bvh/light_bvh.h"
 #include "methods/light_sampling/direct_lighting.h"
 #include "methods/light_tree/light_tree.h"
@@ -29,6 +30,7 @@ struct World {
   SceneArrays arrays;
   Tracer tracer;
   LightSet lights;
+  // Over the emitters, or with indirect.joint over these and the virtual point lights:
   LightTree tree;          // built when direct.hierarchy is perfect and direct.selection is root or cut
   TwoLevelTree two_level;  // built when direct.hierarchy is two-level and direct.selection is root or cut
   LightBvh bvh;            // built when direct.hierarchy is saoh or agglomerative and direct.selection is root or cut
@@ -37,8 +39,12 @@ struct World {
   std::uint64_t texture_key = 0, shape_key = 0;  // of what is kept
   // When indirect.transport is vpl:
   VplSet vpls;
-  SubstituteTree substitutes;  // built when indirect.selection is root
+  VplLightSet vpl_lights;      // gathered when a light tree is over them, or with indirect.joint behind `lights`
+  // Not with indirect.joint:
+  SubstituteTree substitutes;  // built when indirect.hierarchy is substitute and indirect.selection is root
   AliasTable vpl_alias;        // built when indirect.selection is power
+  LightTree vpl_tree;          // built when indirect.hierarchy is perfect and indirect.selection is root or cut
+  LightBvh vpl_bvh;            // built when indirect.hierarchy is saoh or agglomerative and indirect.selection is root
 };
 
 // The scene at settings.time: transforms, acceleration structure, emitters, hierarchy, camera. `scene` must
@@ -49,7 +55,8 @@ std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, 
 // Gives back to `kept` what later frames can use.
 void keep(World&& world, History::Kept& kept);
 
-// Emitters and their hierarchy alone, as every frame rebuilds them.
+// Emitters and their hierarchy alone, as every frame rebuilds them; with indirect.joint the hierarchy waits for the virtual
+// point lights.
 void build_lights(World& world, const Settings& settings, RenderStats& stats);
 
 // Virtual point lights for camera sample `sample`, and what chooses among them. Does nothing when indirect.transport is
@@ -59,7 +66,7 @@ void trace_vpls(World& world, const Settings& settings, int sample, RenderStats&
 // The sampler that settings.indirect asks for, over the world's virtual point lights.
 IndirectLighting make_indirect_lighting(const World& world, const Settings& settings, int sample);
 
-// The light sampler that settings.direct asks for, over the world's lights.
+// The light sampler that settings.direct asks for, over the world's lights, with indirect.joint its virtual point lights too.
 DirectLighting make_direct_lighting(const World& world, const Settings& settings, int sample);
 
 // Adds camera sample number `sample` (from 0) to every pixel of the crop window. Pass times and rays go to

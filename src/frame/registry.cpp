@@ -210,6 +210,50 @@ std::vector<Setting> scene_rows() {
   };
 }
 
+// What direct.* and indirect.* have in common of walks, cuts and splitting. `of`: generic lambda from (const) Settings& to
+// the group.
+template <class Group>
+std::vector<Setting> selection_rows(const std::string& prefix, Group of) {
+  using std::pair;
+  using std::string;
+  using std::vector;
+  return {
+      choice(
+          prefix + ".width", [=](auto& s) -> auto& { return of(s).width; },
+          vector<pair<string, int>>{{"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}},
+          "Children of a node of the hierarchies perfect and two-level"),
+      flag(
+          prefix + ".cones", [=](auto& s) -> auto& { return of(s).cones; },
+          "Weights also bound the cosine at the lights, so that those facing away are left out"),
+      integer(
+          prefix + ".spp", [=](auto& s) -> auto& { return of(s).spp; }, {1, 4096}, "samples",
+          "Light samples for each camera sample"),
+      integer(
+          prefix + ".cut_share", [=](auto& s) -> auto& { return of(s).cut_share; }, {1, 64}, "pixels",
+          fmt::format("Edge of the blocks of pixels that share a cut; {}.spp is the number of the cut's nodes", prefix)),
+      integer(
+          prefix + ".cut_interleave", [=](auto& s) -> auto& { return of(s).cut_interleave; }, {1, 8}, "pixels",
+          "Edge of the blocks of pixels that share out a cut's nodes among them; 1 = every pixel samples all"),
+      real(
+          prefix + ".cut_floor", [=](auto& s) -> auto& { return of(s).cut_floor; }, {0, 1, true}, "R",
+          "Least distance in the error bound of cuts; R = diagonal of the lights' box"),
+      choice(
+          prefix + ".cut_bound", [=](auto& s) -> auto& { return of(s).cut_bound; },
+          vector<pair<string, CutBound>>{{"nearest", CutBound::kNearest},
+                                         {"exact", CutBound::kExact},
+                                         {"children", CutBound::kChildren}},
+          "Error of a cut's node: by one box around its lights, with the cosine of the box's nearest point or an exact "
+          "bound of it; or the sum over the boxes inside it"),
+      real(
+          prefix + ".split", [=](auto& s) -> auto& { return of(s).split; }, {0, 1}, "",
+          "Threshold of adaptive tree splitting: a light sample below each part of the tree; larger = more parts, 0 = no "
+          "splitting (hierarchies saoh and agglomerative)"),
+      integer(
+          prefix + ".split_cap", [=](auto& s) -> auto& { return of(s).split_cap; }, {1, kMaxSplit}, "samples",
+          "Most parts that the tree is split into at a surface"),
+  };
+}
+
 std::vector<Setting> direct_rows() {
   using std::pair;
   using std::string;
@@ -242,46 +286,13 @@ std::vector<Setting> direct_rows() {
           "Weights of a node's children: mean of those at least and at greatest distance; at the least, left out for all "
           "of them when a box is wider than far; or at the centre with bounds of the angles (hierarchies saoh and "
           "agglomerative)"),
-      choice(
-          "direct.width", [](auto& s) -> auto& { return s.direct.width; },
-          vector<pair<string, int>>{{"2", 2}, {"4", 4}, {"8", 8}, {"16", 16}},
-          "Children of a hierarchy node"),
-      flag(
-          "direct.cones", [](auto& s) -> auto& { return s.direct.cones; },
-          "Weights also bound the cosine at the emitters, so that those facing away are left out"),
-      integer(
-          "direct.spp", [](auto& s) -> auto& { return s.direct.spp; }, {1, 4096}, "samples",
-          "Light samples for each camera sample"),
       flag(
           "direct.mis", [](auto& s) -> auto& { return s.direct.mis; },
           "Combine light samples with BSDF samples (balance heuristic)"),
-      integer(
-          "direct.cut_share", [](auto& s) -> auto& { return s.direct.cut_share; }, {1, 64}, "pixels",
-          "Edge of the blocks of pixels that share a cut; direct.spp is the number of the cut's nodes"),
-      integer(
-          "direct.cut_interleave", [](auto& s) -> auto& { return s.direct.cut_interleave; }, {1, 8}, "pixels",
-          "Edge of the blocks of pixels that share out a cut's nodes among them; 1 = every pixel samples all"),
-      real(
-          "direct.cut_floor", [](auto& s) -> auto& { return s.direct.cut_floor; }, {0, 1, true}, "R",
-          "Least distance in the error bound of cuts; R = diagonal of the lights' box"),
-      choice(
-          "direct.cut_bound", [](auto& s) -> auto& { return s.direct.cut_bound; },
-          vector<pair<string, CutBound>>{{"nearest", CutBound::kNearest},
-                                         {"exact", CutBound::kExact},
-                                         {"children", CutBound::kChildren}},
-          "Error of a cut's node: by one box around its lights, with the cosine of the box's nearest point or an exact "
-          "bound of it; or the sum over the boxes inside it"),
       choice(
           "direct.pool", [](auto& s) -> auto& { return s.direct.pool; },
           vector<pair<string, int>>{{"16", 16}, {"32", 32}, {"48", 48}, {"64", 64}},
           "Lights that are drawn for a block of cut_share x cut_share pixels; every pixel takes direct.spp of them"),
-      real(
-          "direct.split", [](auto& s) -> auto& { return s.direct.split; }, {0, 1}, "",
-          "Threshold of adaptive tree splitting: a light sample below each part of the tree; larger = more parts, 0 = no "
-          "splitting (hierarchies saoh and agglomerative)"),
-      integer(
-          "direct.split_cap", [](auto& s) -> auto& { return s.direct.split_cap; }, {1, kMaxSplit}, "samples",
-          "Most parts that the tree is split into at a surface"),
   };
 }
 
@@ -324,40 +335,46 @@ std::vector<Setting> vpl_rows() {
           vector<pair<string, Selection>>{{"uniform", Selection::kUniform},
                                           {"power", Selection::kPower},
                                           {"root", Selection::kRoot},
-                                          {"all", Selection::kAll}},
-          "How VPLs are chosen: each alike, by power, walking the hierarchy from its root, or all of them"),
+                                          {"all", Selection::kAll},
+                                          {"cut", Selection::kCut}},
+          "How VPLs are chosen: each alike, by power, walking the hierarchy from its root, all of them, or walking it from "
+          "every node of a cut"),
       choice(
           "indirect.hierarchy", [](auto& s) -> auto& { return s.indirect.hierarchy; },
-          vector<pair<string, IndirectHierarchy>>{{"none", IndirectHierarchy::kNone},
-                                                  {"substitute", IndirectHierarchy::kSubstitute}},
-          "Hierarchy over the VPLs"),
+          vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
+                                          {"substitute", Hierarchy::kSubstitute},
+                                          {"perfect", Hierarchy::kPerfect},
+                                          {"saoh", Hierarchy::kSaoh},
+                                          {"agglomerative", Hierarchy::kAgglomerative}},
+          "Hierarchy over the VPLs: the substitute tree, or one of the light trees of direct.hierarchy"),
       choice(
           "indirect.topology", [](auto& s) -> auto& { return s.indirect.topology; },
           vector<pair<string, Topology>>{{"radix", Topology::kRadix}, {"perfect", Topology::kPerfect}},
-          "Where the hierarchy splits the sorted VPLs: where their codes differ, or in the middle"),
+          "Where the substitute tree splits the sorted VPLs: where their codes differ, or in the middle"),
       choice(
           "indirect.weights", [](auto& s) -> auto& { return s.indirect.weights; },
-          vector<pair<string, IndirectWeights>>{{"distance-bounded", IndirectWeights::kDistanceBounded},
-                                                {"in-box", IndirectWeights::kInBox},
-                                                {"yuksel", IndirectWeights::kYuksel}},
-          "Distance in the weights of a node's children: to the mean, bounded from below; the same, left out inside the "
-          "box; to the box, left out for both children when one is wider than far"),
+          vector<pair<string, Weights>>{{"distance-bounded", Weights::kDistanceBounded},
+                                        {"in-box", Weights::kInBox},
+                                        {"yuksel", Weights::kYuksel},
+                                        {"min-max", Weights::kMinMax},
+                                        {"saoh", Weights::kSaoh}},
+          "Weights of a node's children. Substitute tree: by the distance to the mean, bounded from below; the same, left "
+          "out inside the box; to the box, left out for both children when one is wider than far. Light trees: as "
+          "direct.weights"),
       real(
           "indirect.distance_floor", [](auto& s) -> auto& { return s.indirect.distance_floor; }, {0, 1}, "D",
-          "Least distance in the weights"),
-      flag(
-          "indirect.cones", [](auto& s) -> auto& { return s.indirect.cones; },
-          "Weights also bound the cosine at the VPLs"),
+          "Least distance in the weights of trees over VPLs; 0 = none"),
       flag(
           "indirect.gloss", [](auto& s) -> auto& { return s.indirect.gloss; },
-          "VPLs light gloss lobes too, by walks of their own; otherwise only diffuse reflection"),
-      integer(
-          "indirect.spp", [](auto& s) -> auto& { return s.indirect.spp; }, {1, 4096}, "samples",
-          "VPL samples for each camera sample"),
+          "VPLs light gloss lobes too (the substitute tree by walks of their own); otherwise only diffuse reflection"),
+      flag(
+          "indirect.joint", [](auto& s) -> auto& { return s.indirect.joint; },
+          "Emitters and VPLs are one set of lights: direct.* then says how lights are chosen from it, and "
+          "indirect.selection is not used"),
       choice(
           "indirect.stop", [](auto& s) -> auto& { return s.indirect.stop; },
           vector<pair<string, Stop>>{{"leaf", Stop::kLeaf}, {"substitute", Stop::kSubstitute}},
-          "Where a walk ends: at one VPL, or at the first node whose Gaussian may stand for its VPLs"),
+          "Where walks of the substitute tree end: at one VPL, or at the first node whose Gaussian may stand for its VPLs"),
       real(
           "indirect.min_nu", [](auto& s) -> auto& { return s.indirect.min_nu; }, {0, 1}, "",
           "Least agreement of the normals below a substitute"),
@@ -386,7 +403,10 @@ std::vector<Setting> vpl_rows() {
 const std::vector<Setting>& settings() {
   static const std::vector<Setting> rows = [] {
     std::vector<Setting> all{preset_row()};
-    for (const auto& group : {image_rows(), scene_rows(), direct_rows(), indirect_rows(), vpl_rows()})
+    const auto direct = selection_rows("direct", [](auto& s) -> auto& { return s.direct; });
+    const auto indirect = selection_rows("indirect", [](auto& s) -> auto& { return s.indirect; });
+    for (const auto& group :
+         {image_rows(), scene_rows(), direct_rows(), direct, indirect_rows(), vpl_rows(), indirect})
       all.insert(all.end(), group.begin(), group.end());
     for (Setting& row : all) row.info.default_value = row.get(Settings{});
     return all;
@@ -433,12 +453,27 @@ void check_view(const ViewSettings& view) {
   if (!(sine > kLeastSine)) throw Error("view.up is parallel to the viewing direction");
 }
 
-void check_cuts(const DirectSettings& s) {
+bool is_bvh(Hierarchy h) { return h == Hierarchy::kSaoh || h == Hierarchy::kAgglomerative; }
+
+// The checks of a group are given its prefix, "direct" or "indirect".
+
+void check_hierarchy(const std::string& prefix, const SelectionSettings& s) {
+  if (s.hierarchy != Hierarchy::kNone) return;
+  if (s.selection == Selection::kRoot)
+    throw Error(
+        fmt::format("{0}.selection 'root' walks a hierarchy, but {0}.hierarchy is 'none'; use 'perfect'", prefix));
+  if (s.selection == Selection::kCut)
+    throw Error(fmt::format("{0}.selection 'cut' cuts a hierarchy, but {0}.hierarchy is 'none'; use 'perfect'", prefix));
+}
+
+void check_cuts(const std::string& prefix, const SelectionSettings& s) {
   if (s.selection != Selection::kCut) return;
-  if (s.hierarchy == Hierarchy::kNone)
-    throw Error("direct.selection 'cut' cuts a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
+  if (s.hierarchy == Hierarchy::kSubstitute)
+    throw Error(fmt::format("{0}.selection 'cut' cuts light trees, but {0}.hierarchy is 'substitute'; use 'perfect', 'saoh' "
+                            "or 'agglomerative'",
+                            prefix));
   if (s.spp > kMaxCut)
-    throw Error(fmt::format("a cut has at most {} nodes, but direct.spp is {}", kMaxCut, s.spp));
+    throw Error(fmt::format("a cut has at most {} nodes, but {}.spp is {}", kMaxCut, prefix, s.spp));
 }
 
 void check_pools(const DirectSettings& s) {
@@ -451,25 +486,65 @@ void check_pools(const DirectSettings& s) {
   if (s.mis) throw Error("direct.mis does not combine with pools; set direct.selection 'root' or 'cut', or direct.mis false");
 }
 
-void check_light_bvh(const DirectSettings& s) {
-  if (s.selection != Selection::kRoot && s.selection != Selection::kCut) return;
-  const bool bvh = s.hierarchy == Hierarchy::kSaoh || s.hierarchy == Hierarchy::kAgglomerative;
-  if (s.weights == Weights::kSaoh && !bvh)
-    throw Error("direct.weights 'saoh' needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 'min-max' or "
-                "'yuksel'");
-  if (s.split > 0 && !bvh)
-    throw Error("direct.split needs direct.hierarchy 'saoh' or 'agglomerative'; for others use 0");
-  if (s.split > 0 && s.selection == Selection::kCut)
-    throw Error("direct.split does not combine with cuts; set direct.split 0 or direct.selection 'root'");
+// Weights that a hierarchy can have, in the words of the rows.
+std::vector<std::string> weights_of(Hierarchy h) {
+  if (h == Hierarchy::kSubstitute) return {"distance-bounded", "in-box", "yuksel"};
+  if (is_bvh(h)) return {"min-max", "yuksel", "saoh"};
+  return {"min-max", "yuksel"};
 }
 
-void check_vpls(const IndirectSettings& s) {
+void check_weights(const std::string& prefix, const Settings& all, const SelectionSettings& s) {
+  const std::string weights = get_value(all, prefix + ".weights"), hierarchy = get_value(all, prefix + ".hierarchy");
+  const auto has = [&](Hierarchy h) {
+    const std::vector<std::string> valid = weights_of(h);
+    return std::find(valid.begin(), valid.end(), weights) != valid.end();
+  };
+  if (has(s.hierarchy)) return;
+  std::string needed = "'perfect', 'saoh' or 'agglomerative'";
+  if (has(Hierarchy::kSubstitute)) needed = "'substitute'";
+  if (weights == "saoh") needed = "'saoh' or 'agglomerative'";
+  throw Error(fmt::format("{0}.weights '{1}' needs {0}.hierarchy {2}; with {0}.hierarchy '{3}' use '{4}'", prefix, weights,
+                          needed, hierarchy, fmt::join(weights_of(s.hierarchy), "' or '")));
+}
+
+void check_selection(const std::string& prefix, const Settings& all, const SelectionSettings& s) {
+  check_hierarchy(prefix, s);
+  check_cuts(prefix, s);
+  if (s.selection != Selection::kRoot && s.selection != Selection::kCut) return;
+  check_weights(prefix, all, s);
+  if (s.split > 0 && !is_bvh(s.hierarchy))
+    throw Error(
+        fmt::format("{0}.split needs {0}.hierarchy 'saoh' or 'agglomerative'; for others use 0", prefix));
+  if (s.split > 0 && s.selection == Selection::kCut)
+    throw Error(fmt::format("{0}.split does not combine with cuts; set {0}.split 0 or {0}.selection 'root'", prefix));
+}
+
+void check_joint(const Settings& s) {
+  if (s.indirect.transport != Transport::kVpl)
+    throw Error(fmt::format("indirect.joint puts VPLs among the lights, but indirect.transport is '{}'; use 'vpl'",
+                            get_value(s, "indirect.transport")));
+  if (s.direct.selection == Selection::kPool)
+    throw Error("indirect.joint does not combine with pools, which hold no VPLs; set direct.selection 'root' or 'cut', or "
+                "indirect.joint false");
+  const bool walks = s.direct.selection == Selection::kRoot || s.direct.selection == Selection::kCut;
+  if (s.direct.hierarchy == Hierarchy::kTwoLevel && walks)
+    throw Error("indirect.joint needs one tree over all lights, but direct.hierarchy is 'two-level'; use 'perfect', 'saoh' "
+                "or 'agglomerative'");
+}
+
+void check_vpls(const Settings& all) {
+  const IndirectSettings& s = all.indirect;
+  if (s.joint) check_joint(all);
   if (s.transport != Transport::kVpl) return;
-  if (s.selection == Selection::kRoot && s.hierarchy == IndirectHierarchy::kNone)
-    throw Error("indirect.selection 'root' walks a hierarchy, but indirect.hierarchy is 'none'; use 'substitute'");
-  if (s.correction > 0 && (s.selection != Selection::kRoot || s.stop != Stop::kSubstitute))
-    throw Error("indirect.correction corrects substitutes, but none are used; set indirect.selection 'root' and "
-                "indirect.stop 'substitute', or indirect.correction 0");
+  if (!s.joint) check_selection("indirect", all, s);
+  const bool walks = !s.joint && (s.selection == Selection::kRoot || s.selection == Selection::kCut);
+  const bool substitute_tree = walks && s.hierarchy == Hierarchy::kSubstitute;
+  if (s.correction > 0 && !(substitute_tree && s.stop == Stop::kSubstitute))
+    throw Error("indirect.correction corrects substitutes, but none are used; set indirect.joint false, indirect.selection "
+                "'root', indirect.hierarchy 'substitute' and indirect.stop 'substitute', or indirect.correction 0");
+  if (s.show && (s.joint || (walks && !substitute_tree)))
+    throw Error("indirect.show shows walks of the substitute tree, but none is used; set indirect.joint false and "
+                "indirect.hierarchy 'substitute', or indirect.show false");
 }
 
 }  // namespace
@@ -607,12 +682,9 @@ void check(const Settings& s) {
   check_ranges(s);
   check_image(s);
   if (s.view) check_view(*s.view);
-  if (s.direct.selection == Selection::kRoot && s.direct.hierarchy == Hierarchy::kNone)
-    throw Error("direct.selection 'root' walks a hierarchy, but direct.hierarchy is 'none'; use 'perfect'");
-  check_cuts(s.direct);
+  check_selection("direct", s, s.direct);
   check_pools(s.direct);
-  check_light_bvh(s.direct);
-  check_vpls(s.indirect);
+  check_vpls(s);
 }
 
 }  // namespace lumigrove

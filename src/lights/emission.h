@@ -102,7 +102,7 @@ LUMI_HD inline EmittedRay emit_from_triangle(const LightSources& sources, std::u
 LUMI_HD inline EmittedRay emit_from_punctual(const LightSources& sources, std::uint32_t index, vec2 u) {
   EmittedRay ray;
   const Emitter& e = sources.lights.emitters[index];
-  const PunctualView& light = sources.lights.punctual[e.source & ~Emitter::kPunctual];
+  const PunctualView& light = sources.lights.punctual[e.index()];
   ray.origin = e.p0;
   ray.range = light.range;
   if (!light.spot) {

@@ -1,7 +1,7 @@
 // One emitter of the light set: flux, bounds, a point on it, and the light that arrives from that point.
 //
 // Point and spot lights follow KHR_lights_punctual: smooth cone edge squared, window 1 - (d/range)^4 over the
-// inverse square. Triangles are sampled uniformly by area.
+// inverse square. Triangles are sampled uniformly by area. Of virtual point lights, cosine over squared distance is clamped.
 #pragma once
 
 #include "base/lanes.h"
@@ -22,12 +22,12 @@ LUMI_HD inline vec3 mean_radiance(const LightView& lights, const Emitter& e, std
 // Non-finite or negative values (a degenerate triangle, an absurd transform) count as no light.
 LUMI_HD inline float finite_or_zero(float x) { return x > 0 && x < 3e38f ? x : 0.0f; }
 
-// Largest radiant intensity in any direction, Y, W/sr: L*A of a triangle, I of a point or spot light. This is
+// Largest radiant intensity in any direction, Y, W/sr: L*A of a triangle, I of any other light. This is
 // ||I|| of the light trees, which bound direction and distance separately.
 LUMI_HD inline float emitter_intensity(const LightView& lights, std::uint32_t index) {
   const Emitter& e = lights.emitters[index];
-  if (e.punctual())
-    return finite_or_zero(luminance(lights.punctual[e.source & ~Emitter::kPunctual].intensity));
+  if (e.punctual()) return finite_or_zero(luminance(lights.punctual[e.index()].intensity));
+  if (e.vpl()) return finite_or_zero(luminance(e.e2));
   return finite_or_zero(luminance(mean_radiance(lights, e, index)) * triangle_area(e));
 }
 
@@ -35,8 +35,9 @@ LUMI_HD inline float emitter_intensity(const LightView& lights, std::uint32_t in
 LUMI_HD inline float emitter_flux(const LightView& lights, std::uint32_t index) {
   const Emitter& e = lights.emitters[index];
   const float intensity = emitter_intensity(lights, index);
-  if (!e.punctual()) return intensity * kPi * (lights.instances[e.source].double_sided ? 2.0f : 1.0f);
-  if (!lights.punctual[e.source & ~Emitter::kPunctual].spot) return intensity * 4 * kPi;
+  if (e.triangle()) return intensity * kPi * (lights.instances[e.source].double_sided ? 2.0f : 1.0f);
+  if (e.vpl()) return intensity * kPi;
+  if (!lights.punctual[e.index()].spot) return intensity * 4 * kPi;
   // Integral of the squared linear ramp in cos over the cone; in the thinnest cones it does not rise to 1.
   const float cone = glm::max(0.0f, 1 - e.e2.x), ramp = glm::min(1 / e.e2.y, cone), top = ramp * e.e2.y;
   return intensity * 2 * kPi * (cone - ramp + ramp * top * top / 3);
@@ -49,7 +50,7 @@ LUMI_HD inline std::uint32_t light_count(const LightView& lights) {
 }
 
 LUMI_HD inline Box3 emitter_bounds(const Emitter& e) {
-  if (e.punctual()) return {e.p0, e.p0};
+  if (!e.triangle()) return {e.p0, e.p0};
   const vec3 p1 = e.p0 + e.e1, p2 = e.p0 + e.e2;
   return {glm::min(e.p0, glm::min(p1, p2)), glm::max(e.p0, glm::max(p1, p2))};
 }
@@ -65,9 +66,10 @@ struct NormalCone {
 LUMI_HD inline NormalCone emission_cone(const LightView& lights, const Emitter& e) {
   constexpr NormalCone kAll{vec3(0), 2};
   if (e.punctual()) {
-    const bool forwards = lights.punctual[e.source & ~Emitter::kPunctual].spot && e.e2.x >= 0;
+    const bool forwards = lights.punctual[e.index()].spot && e.e2.x >= 0;
     return forwards ? NormalCone{e.e1, 0} : kAll;
   }
+  if (e.vpl()) return {e.e1, 0};
   if (lights.instances[e.source].double_sided) return kAll;
   const vec3 n = glm::cross(e.e1, e.e2);
   const float squared = length_squared(n);
@@ -83,10 +85,12 @@ LUMI_HD inline std::uint32_t emitter_of_triangle(const LightView& lights, std::u
   return rank == EmissiveInstance::kNoEmitters ? rank : e.first + rank;
 }
 
-// Identity of an emitter that lasts while the scene's structure lasts, also when other lights come and go.
+// Identity of an emitter that lasts while the scene's structure lasts, also when other lights come and go. Virtual point
+// lights have none.
 LUMI_HD inline std::uint32_t stable_id(const LightView& lights, std::uint32_t index) {
   const Emitter& e = lights.emitters[index];
-  if (e.punctual()) return lights.punctual[e.source & ~Emitter::kPunctual].stable_id;
+  if (e.punctual()) return lights.punctual[e.index()].stable_id;
+  if (e.vpl()) return EmissiveInstance::kNoEmitters;
   const EmissiveInstance& instance = lights.instances[e.source];
   const std::uint32_t rank = index - instance.first;
   return instance.stable_base + (instance.triangles ? instance.triangles[rank] : rank);
@@ -97,9 +101,10 @@ struct EmitterPoint {
   vec3 position = vec3(0);
   vec3 wi = vec3(0);  // unit, from x to position
   float distance = 0;
-  vec3 incident = vec3(0);  // triangles: radiance; point and spot: irradiance at normal incidence
+  vec3 incident = vec3(0);  // triangles: radiance; others: irradiance at normal incidence
   float area_to_solid =
       0;  // d^2 / cos at the light: converts a pdf per area to one per solid angle; 0 for a delta
+  vec3 clear = vec3(0);  // virtual point lights: position, lifted off the surface that they are on
 };
 
 // KHR_lights_punctual: what is left of a light at squared distance d2. Range 0 is unlimited.
@@ -117,7 +122,7 @@ LUMI_HD inline float spot_profile(const Emitter& e, float cos_axis) {
 
 LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitter& e, vec3 x) {
   EmitterPoint p;
-  const PunctualView& light = lights.punctual[e.source & ~Emitter::kPunctual];
+  const PunctualView& light = lights.punctual[e.index()];
   const vec3 to_light = e.p0 - x;
   const float d2 = length_squared(to_light);
   if (!(d2 > 0)) return p;
@@ -127,6 +132,21 @@ LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitte
   float attenuation = range_window(d2, light.range) / d2;
   if (light.spot) attenuation *= spot_profile(e, -glm::dot(p.wi, e.e1));
   p.incident = light.intensity * attenuation;
+  return p;
+}
+
+LUMI_HD inline EmitterPoint vpl_point(const LightView& lights, const Emitter& e, vec3 x) {
+  EmitterPoint p;
+  const vec3 to_light = e.p0 - x;
+  const float d2 = length_squared(to_light);
+  if (!(d2 > 0)) return p;
+  p.position = e.p0;
+  p.distance = glm::sqrt(d2);
+  p.wi = to_light / p.distance;
+  const float cos_light = -glm::dot(p.wi, e.e1);
+  if (!(cos_light > 0)) return p;
+  p.incident = e.e2 * glm::min(cos_light / d2, lights.vpl_clamp);
+  p.clear = e.p0 + e.e1 * lights.vpls[e.index()].epsilon;
   return p;
 }
 
@@ -189,13 +209,14 @@ LUMI_HD LUMI_ALWAYS_INLINE EmitterPoint triangle_point(const SceneView& scene, c
 LUMI_HD LUMI_ALWAYS_INLINE EmitterPoint sample_emitter_point(const SceneView& scene, const LightView& lights,
                                                  std::uint32_t index, vec3 x, vec2 u) {
   const Emitter& e = lights.emitters[index];
-  return e.punctual() ? punctual_point(lights, e, x) : triangle_point(scene, lights, e, index, x, u);
+  if (e.triangle()) return triangle_point(scene, lights, e, index, x, u);
+  return e.vpl() ? vpl_point(lights, e, x) : punctual_point(lights, e, x);
 }
 
 // Density per solid angle at `x` with which sample_emitter_point finds the point `y` of triangle `index`.
 LUMI_HD inline float pdf_emitter_point(const LightView& lights, std::uint32_t index, vec3 x, vec3 y) {
   const Emitter& e = lights.emitters[index];
-  if (e.punctual()) return 0;
+  if (!e.triangle()) return 0;
   const vec3 to_light = y - x;
   const float d2 = length_squared(to_light);
   const vec3 n = glm::cross(e.e1, e.e2);  // |n| = 2A

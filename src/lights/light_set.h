@@ -13,6 +13,7 @@
 
 #include "base/large_array.h"
 #include "base/vec.h"
+#include "lights/vpl.h"
 #include "lumigrove/scene.h"
 #include "lumigrove/settings.h"
 #include "scene/scene_view.h"
@@ -21,13 +22,17 @@ namespace lumigrove {
 
 // 40 bytes. A triangle in world space: p0, edges e1 and e2 wound so that cross(e1, e2) points to the emitting
 // side. A point or spot light: p0 = position, e1 = unit axis, e2 = (cos outer, 1 / (cos inner - cos outer),
-// unused).
+// unused). A virtual point light: p0 = position, e1 = unit normal, e2 = intensity along it, W/sr.
 struct Emitter {
   vec3 p0, e1, e2;
-  std::uint32_t source;  // mesh instance, or kPunctual | index into LightView::punctual
+  // Mesh instance, or kPunctual | index into LightView::punctual, or kVpl | index into LightView::vpls.
+  std::uint32_t source;
 
-  static constexpr std::uint32_t kPunctual = 0x80000000u;
+  static constexpr std::uint32_t kPunctual = 0x80000000u, kVpl = 0x40000000u;
+  LUMI_HD bool triangle() const { return (source & (kPunctual | kVpl)) == 0; }  // the others have no area
   LUMI_HD bool punctual() const { return (source & kPunctual) != 0; }
+  LUMI_HD bool vpl() const { return (source & kVpl) != 0; }
+  LUMI_HD std::uint32_t index() const { return source & ~(kPunctual | kVpl); }  // without the kind
 };
 
 // What the triangles of one mesh instance share. `first` is kNoEmitters when the instance does not emit.
@@ -81,6 +86,8 @@ struct LightView {
   float environment_flux = 0;  // Y, through the scene's bounding sphere
   float scene_disc = 0;        // m^2, cross-section of the scene's bounding sphere
   float diagonal = 1;          // D, metres
+  std::span<const Vpl> vpls;      // sources of the emitters that are virtual point lights
+  float vpl_clamp = kInfinity;    // most of cos / d^2 at one, 1/m^2
 };
 
 // What does not change from frame to frame: which triangles of each mesh emit, and how brightly their texture

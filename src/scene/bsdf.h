@@ -53,6 +53,11 @@ LUMI_HD inline bool has_gloss(const Surface& s) {
   return max_component(s.specular) > 0 && glm::dot(s.normal, s.wo) > 0;
 }
 
+// Do virtual point lights light it? `wanted`: at all; mirrors are left to a ray of their own.
+LUMI_HD inline bool vpls_light_gloss(bool wanted, float mirror_roughness, const Surface& s) {
+  return wanted && s.roughness > mirror_roughness && has_gloss(s);
+}
+
 LUMI_HD inline bool above_surface(const Surface& s, vec3 wi) {
   return glm::dot(s.normal, wi) > 0 && glm::dot(s.geometric_normal, wi) > 0;
 }

@@ -16,6 +16,7 @@
 #include "lights/light_set.h"
 #include "lights/unoccluded_kernel.h"
 #include "lights/vpl.h"
+#include "lights/vpl_emitter_kernel.h"
 #include "methods/light_bvh/light_bvh_kernel.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 #include "methods/light_sampling/light_pool_kernel.h"
@@ -118,6 +119,8 @@ template void cuda::launch<PoolLightKernel>(int, const PoolLightKernel&, cudaStr
 template void cuda::launch<SplitKernel>(int, const SplitKernel&, cudaStream_t);
 template void cuda::launch<DirectLightKernel>(int, const DirectLightKernel&, cudaStream_t);
 template void cuda::launch<AddUnoccludedKernel>(int, const AddUnoccludedKernel&, cudaStream_t);
+template void cuda::launch<AddUnoccludedByKindKernel>(int, const AddUnoccludedByKindKernel&, cudaStream_t);
+template void cuda::launch<VplEmitterKernel>(int, const VplEmitterKernel&, cudaStream_t);
 template void cuda::launch<PathStartKernel>(int, const PathStartKernel&, cudaStream_t);
 template void cuda::launch<PathScatterKernel>(int, const PathScatterKernel&, cudaStream_t);
 template void cuda::launch<PathEscapeKernel>(int, const PathEscapeKernel&, cudaStream_t);

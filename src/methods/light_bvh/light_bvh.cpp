@@ -21,6 +21,7 @@ void LightBvh::build(const LightView& lights, const Options& options) {
   view_.inside2 = std::max(1e-14f * lights.diagonal * lights.diagonal, 1e-30f);
   const float unit = lights.bounds.diagonal();
   view_.unit2 = std::max(unit * unit, view_.inside2);
+  view_.floor2 = std::max(view_.inside2, options.floor * options.floor);
 
   // Morton order first: neighbours in space are then neighbours in memory.
   LargeArray<KeyIndex> keys(static_cast<std::size_t>(emitters)), scratch;

@@ -22,6 +22,7 @@ class LightBvh {
     Hierarchy builder = Hierarchy::kSaoh;  // kSaoh or kAgglomerative
     Weights weights = Weights::kMinMax;
     bool cones = true;  // not of kSaoh
+    float floor = 0;    // as LightTree::Options
   };
   // Buffers are reused by the next build.
   void build(const LightView& lights, const Options& options);

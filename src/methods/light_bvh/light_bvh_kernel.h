@@ -71,10 +71,12 @@ struct LightBvhView {
   const std::uint32_t* emitter_leaves = nullptr;  // emitter -> number of its leaf, kNoEmitter if none
   std::uint32_t count = 0;                         // leaves
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
+  float floor2 = 0;                                // least squared distance in the weights, m^2
   float unit2 = 1;                                 // squared unit of length of the splitting criterion, m^2
   bool cones = true;                               // not kSaoh: weights bound the emitters' own cosine
   Weights weights = Weights::kMinMax;
 
+  LUMI_HD BoxNearness nearness() const { return {inside2, floor2}; }
   LUMI_HD std::uint32_t link(std::uint32_t entry) const { return nodes[entry / 2].child[entry % 2]; }
 };
 
@@ -108,11 +110,11 @@ LUMI_HD inline float bound_emission(PackedCone cone, vec3 to_surface, AngleCosSi
 }
 
 // Importance of child c for a surface; 0 only if nothing below it can light the surface.
-LUMI_HD inline float saoh_importance(const LightNode<2>& node, int c, float inside2, vec3 x, vec3 n) {
+LUMI_HD inline float saoh_importance(const LightNode<2>& node, int c, float floor2, vec3 x, vec3 n) {
   if (!(node.intensity[c] > 0)) return 0;
   const vec3 to_centre = vec3(node.centre_x[c], node.centre_y[c], node.centre_z[c]) - x;
   const vec3 half(node.half_x[c], node.half_y[c], node.half_z[c]);
-  const float radius2 = glm::max(length_squared(half), inside2), distance2 = length_squared(to_centre);
+  const float radius2 = glm::max(length_squared(half), floor2), distance2 = length_squared(to_centre);
   if (!(distance2 > radius2)) return node.intensity[c] / radius2;
   const vec3 direction = to_centre * (1 / glm::sqrt(distance2));
   const float sine2 = radius2 / distance2;
@@ -128,9 +130,9 @@ LUMI_HD inline float saoh_importance(const LightNode<2>& node, int c, float insi
 
 LUMI_HD inline ChildWeights<2> weigh_children(const LightBvhView& bvh, const LightBvhNode& node, vec3 x, vec3 n) {
   if (bvh.weights != Weights::kSaoh)
-    return weigh_children<2>(node.bounds, Weighing{bvh.weights, bvh.cones, bvh.inside2}, x, n);
-  const float weights[2] = {saoh_importance(node.bounds, 0, bvh.inside2, x, n),
-                            saoh_importance(node.bounds, 1, bvh.inside2, x, n)};
+    return weigh_children<2>(node.bounds, Weighing{bvh.weights, bvh.cones, bvh.nearness()}, x, n);
+  const float weights[2] = {saoh_importance(node.bounds, 0, bvh.floor2, x, n),
+                            saoh_importance(node.bounds, 1, bvh.floor2, x, n)};
   const float sums[2] = {weights[0], weights[0] + weights[1]};
   return {load_lanes<2>(weights), load_lanes<2>(sums), sums[1]};
 }
@@ -223,9 +225,10 @@ LUMI_HD inline float split_variance(const LightBvhView& bvh, std::uint32_t entry
   const std::uint32_t c = entry % 2;
   const vec3 apart = glm::abs(vec3(box.centre_x[c], box.centre_y[c], box.centre_z[c]) - x);
   const vec3 half(box.half_x[c], box.half_y[c], box.half_z[c]);
-  const float near2 = length_squared(glm::max(apart - half, vec3(0)));
-  if (!(near2 > bvh.inside2)) return kInfinity;
-  const float a = glm::sqrt(near2 / bvh.unit2), b = glm::sqrt(length_squared(apart + half) / bvh.unit2);
+  const float near2 = length_squared(glm::max(apart - half, vec3(0))), far2 = length_squared(apart + half);
+  if (!(glm::max(near2, bvh.floor2) > bvh.inside2)) return kInfinity;
+  const float a = glm::sqrt(glm::max(near2, bvh.floor2) / bvh.unit2),
+              b = glm::sqrt(glm::max(far2, bvh.floor2) / bvh.unit2);
   // g = 1 / d^2 with d uniform in [a, b].
   const float mean_g = 1 / (a * b), variance_g = (b - a) * (b - a) * mean_g * mean_g * mean_g * (1.0f / 3);
   const float intensity2 = box.intensity[c] * box.intensity[c];

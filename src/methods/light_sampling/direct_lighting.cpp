@@ -33,15 +33,20 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
                     std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
                     std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
   const int count = static_cast<int>(surfaces.size());
+  buffers.from_vpl.resize(buffers.vpl_sum.size());
   {
     const ScopedTimer timer(buffers.select_ms);
     launch(walk_batches(count),
            DirectLightKernel{sampler, lighting.rng, dimension, scale, lighting.mis, surfaces, pixels,
-                             buffers.shadow, buffers.contribution, cuts, stratum, split},
+                             buffers.shadow, buffers.contribution, cuts, stratum, split, buffers.from_vpl},
            kLaunchGrain / kWalkBatch);
   }
   trace_shadow_rays(lighting, buffers);
-  launch(count, AddUnoccludedKernel{buffers.contribution, buffers.occluded, sum});
+  if (buffers.vpl_sum.empty())
+    launch(count, AddUnoccludedKernel{buffers.contribution, buffers.occluded, sum});
+  else
+    launch(count, AddUnoccludedByKindKernel{buffers.contribution, buffers.occluded, buffers.from_vpl, sum,
+                                            buffers.vpl_sum});
 }
 
 // One sample below each node of the cuts; lights at infinity have a sample in every pass.
@@ -146,6 +151,15 @@ void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> s
 }
 
 }  // namespace
+
+void DirectBuffers::add_counters(const DirectBuffers& other) {
+  rays += other.rays;
+  cut_ms += other.cut_ms;
+  pool_ms += other.pool_ms;
+  split_ms += other.split_ms;
+  select_ms += other.select_ms;
+  trace_ms += other.trace_ms;
+}
 
 void add_direct_light(const DirectLighting& lighting, std::span<const Surface> surfaces,
                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,

@@ -46,8 +46,12 @@ struct DirectBuffers {
   std::vector<LightPool> pools;
   std::vector<std::uint32_t> split_entries;
   std::vector<std::uint8_t> split_counts;
+  std::vector<std::uint8_t> from_vpl;
+  std::span<vec3> vpl_sum;  // where not empty, light of virtual point lights is added here instead of to the sum
   std::uint64_t rays = 0;
   double cut_ms = 0, pool_ms = 0, split_ms = 0, select_ms = 0, trace_ms = 0;
+
+  void add_counters(const DirectBuffers& other);
 };
 
 // sum[i] += light reaching surfaces[i] from the chosen lights and leaving it towards wo (radiance).

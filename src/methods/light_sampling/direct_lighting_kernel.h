@@ -7,6 +7,7 @@
 #include "base/rng.h"
 #include "methods/light_sampling/light_sampler_kernel.h"
 #include "methods/light_sampling/triangle_lanes.h"
+#include "methods/light_sampling/vpl_lanes.h"
 #include "methods/lightcuts/cut_kernel.h"
 #include "scene/bsdf.h"
 
@@ -76,6 +77,7 @@ struct DirectLightKernel {
   CutSamples cuts = {};     // none: walks start at the root
   Stratum stratum = {};
   SplitSamples split = {};  // kBvh; none: walks start at the root
+  std::span<std::uint8_t> from_vpl = {};  // is the light of surfaces[i] a virtual point light's? Empty: not wanted
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
@@ -106,6 +108,7 @@ struct DirectLightKernel {
   LUMI_HD bool lights_up(std::size_t i) const {
     shadow[i].tmax = -1;
     contribution[i] = vec3(0);
+    if (!from_vpl.empty()) from_vpl[i] = 0;
     return surfaces[i].instance != kNoId;
   }
 
@@ -214,32 +217,61 @@ struct DirectLightKernel {
   // Lights the surfaces `index` by what their walks chose; `points`: numbers for the place on the light.
   LUMI_HD void finish(const std::uint32_t* index, const ChosenGroup* groups, const vec2* points, const TreeSample* chosen,
                       int count, float weight) const {
+    const LightView& lights = sampler.lights;
+    const std::size_t first_vpl = lights.emitters.size() - lights.vpls.size();
     for (int k = 0; k < count; ++k) {
       if (!(chosen[k].pdf > 0)) continue;
-      const Emitter* emitter = &sampler.lights.emitters[chosen[k].emitter];
+      const Emitter* emitter = &lights.emitters[chosen[k].emitter];
       prefetch(emitter);
       prefetch(&emitter->source);
+      if (chosen[k].emitter >= first_vpl) prefetch(&lights.vpls[chosen[k].emitter - first_vpl].epsilon);
     }
-    TriangleLighting triangles;
+    bool lit[kWalkBatch] = {};
+    if (!lights.instances.empty() && !mis) light_by_plain_triangles(index, groups, points, chosen, count, weight, lit);
+    if (!lights.vpls.empty()) light_by_chosen_vpls(index, groups, chosen, count, weight, lit);
     for (int k = 0; k < count; ++k)
-      if (!add_triangle(triangles, index[k], groups[k], chosen[k], points[k], weight))
-        write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], points[k]), weight);
-    constexpr int kLanes = kWalkBatch < 16 ? kWalkBatch : 16;
-    for (int at = 0; at < triangles.count; at += kLanes)
-      write_lit<kLanes>(light_by_triangles<kLanes>(triangles, at), glm::min(kLanes, triangles.count - at),
-                        triangles.index + at, shadow, contribution);
+      if (!lit[k]) write(index[k], light_in_group(sampler, surfaces[index[k]], groups[k], chosen[k], points[k]), weight);
   }
 
-  // Plain triangles wait to be lit together. False for other lights.
-  LUMI_HD bool add_triangle(TriangleLighting& triangles, std::uint32_t i, const ChosenGroup& group, TreeSample chosen,
-                            vec2 u, float weight) const {
-    if (mis || !(chosen.pdf > 0)) return false;
-    const Emitter& e = sampler.lights.emitters[chosen.emitter];
-    if (e.punctual()) return false;
-    const EmissiveInstance& instance = sampler.lights.instances[e.source];
-    if (instance.textured || instance.masked) return false;
-    triangles.add(i, surfaces[i], e, instance, u, weight / (chosen.pdf * group.probability));
-    return true;
+  static constexpr int kLitLanes = kWalkBatch < 16 ? kWalkBatch : 16;
+
+  // Plain triangles are lit together.
+  LUMI_HD void light_by_plain_triangles(const std::uint32_t* index, const ChosenGroup* groups, const vec2* points,
+                                        const TreeSample* chosen, int count, float weight, bool* lit) const {
+    TriangleLighting triangles;
+    for (int k = 0; k < count; ++k) {
+      if (!(chosen[k].pdf > 0)) continue;
+      const Emitter& e = sampler.lights.emitters[chosen[k].emitter];
+      if (!e.triangle()) continue;
+      const EmissiveInstance& instance = sampler.lights.instances[e.source];
+      if (instance.textured || instance.masked) continue;
+      triangles.add(index[k], surfaces[index[k]], e, instance, points[k],
+                    weight / (chosen[k].pdf * groups[k].probability));
+      lit[k] = true;
+    }
+    for (int at = 0; at < triangles.count; at += kLitLanes)
+      write_lit<kLitLanes>(light_by_triangles<kLitLanes>(triangles, at), glm::min(kLitLanes, triangles.count - at),
+                           triangles.index + at, shadow, contribution);
+  }
+
+  // And so are virtual point lights.
+  LUMI_HD void light_by_chosen_vpls(const std::uint32_t* index, const ChosenGroup* groups, const TreeSample* chosen,
+                                    int count, float weight, bool* lit) const {
+    VplLighting vpls;
+    for (int k = 0; k < count; ++k) {
+      if (!(chosen[k].pdf > 0)) continue;
+      const Emitter& e = sampler.lights.emitters[chosen[k].emitter];
+      if (!e.vpl()) continue;
+      const Surface& surface = surfaces[index[k]];
+      vpls.add(index[k], surface, e, sampler.lights.vpls[e.index()],
+               vpls_light_gloss(sampler.vpl_gloss, sampler.vpl_mirror_roughness, surface),
+               weight / (chosen[k].pdf * groups[k].probability));
+      if (!from_vpl.empty()) from_vpl[index[k]] = 1;
+      lit[k] = true;
+    }
+    for (int at = 0; at < vpls.count; at += kLitLanes)
+      write_lit<kLitLanes>(light_by_vpls<kLitLanes>(vpls, sampler.lights.vpl_clamp, at),
+                           glm::min(kLitLanes, vpls.count - at), vpls.index + at, shadow, contribution);
   }
 
   // Walks that start at one place go together: all of them without cuts, and those of a block that shares one.
@@ -270,6 +302,7 @@ struct DirectLightKernel {
     // Balance heuristic of n = 1 / weight light samples and one BSDF sample.
     if (mis && sample.pdf > 0) light *= sample.pdf / (sample.pdf + weight * bsdf_pdf(surface, sample.wi));
     if (!(max_component(light) > 0) || !is_finite(light)) return;
+    if (!from_vpl.empty()) from_vpl[i] = sample.from_vpl ? 1 : 0;
     contribution[i] = light;
     shadow[i] = shadow_ray(surface, sample, sampler.lights.diagonal);
   }

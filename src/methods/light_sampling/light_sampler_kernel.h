@@ -34,6 +34,9 @@ struct LightSample {
   vec3 weight = vec3(0);               // radiance / pdf, or irradiance / selection probability without area
   std::uint32_t emitter = kNoEmitter;  // local emitter, kNoEmitter for lights at infinity
   float distance = 0;                  // metres; infinite for lights at infinity
+  bool from_vpl = false;               // the emitter is a virtual point light,
+  bool gloss = true;                   // which may be wanted for the diffuse lobe only;
+  vec3 clear = vec3(0);                // where shadow rays to it end, clear of its own surface
 };
 
 enum class LightChoice : std::uint8_t { kUniform, kPower, kTree, kOne, kBvh };
@@ -47,6 +50,9 @@ struct LightSampler {
   LightBvhView bvh;       // kBvh
   std::uint32_t one = 0;  // kOne: emitters, then directional lights, then the environment
   MeshTreesView mesh_trees = {};  // kTree: where present, `tree` is the top level over these
+  // Virtual point lights among the emitters light gloss lobes too, but not of surfaces at most this rough.
+  bool vpl_gloss = true;
+  float vpl_mirror_roughness = 0;
 };
 
 struct GroupProbabilities {
@@ -181,8 +187,13 @@ LUMI_HD LUMI_ALWAYS_INLINE LightSample local_sample(const LightSampler& sampler,
   sample.distance = point.distance;
   sample.emitter = chosen.emitter;
   const Emitter& emitter = sampler.lights.emitters[chosen.emitter];
-  if (emitter.punctual()) {
+  if (!emitter.triangle()) {
     sample.weight = point.incident / chosen.pdf;
+    if (emitter.vpl()) {
+      sample.from_vpl = true;
+      sample.gloss = vpls_light_gloss(sampler.vpl_gloss, sampler.vpl_mirror_roughness, surface);
+      sample.clear = point.clear;
+    }
   } else {
     sample.pdf = chosen.pdf * point.area_to_solid / triangle_area(emitter);
     sample.weight = point.incident / sample.pdf;
@@ -325,7 +336,8 @@ LUMI_HD inline float pdf_environment_beside_local(const LightSampler& sampler, c
 LUMI_HD LUMI_ALWAYS_INLINE vec3 unoccluded_light(const Surface& surface, const LightSample& sample) {
   if (!(max_component(sample.weight) > 0)) return vec3(0);
   const float cosine = glm::dot(surface.normal, sample.wi);
-  return cosine > 0 ? bsdf_eval(surface, sample.wi) * sample.weight * cosine : vec3(0);
+  if (!(cosine > 0)) return vec3(0);
+  return (sample.gloss ? bsdf_eval(surface, sample.wi) : bsdf_eval_diffuse(surface, sample.wi)) * sample.weight * cosine;
 }
 
 // Segment from the surface to the light sample; it stops short of the light by the same relative margin
@@ -337,6 +349,11 @@ LUMI_HD inline Ray shadow_ray(const Surface& surface, const LightSample& sample,
   ray.tmin = 0;
   if (sample.distance == kInfinity) {
     ray.direction = sample.wi * (2 * diagonal);
+    ray.tmax = 1;
+    return ray;
+  }
+  if (sample.from_vpl) {
+    ray.direction = sample.clear - ray.origin;
     ray.tmax = 1;
     return ray;
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/lane_math.h"
+#include "lights/light_set.h"
 #include "lights/lit_lanes.h"
 #include "methods/light_tree/light_tree_kernel.h"
 #include "scene/surface.h"
@@ -14,18 +15,20 @@ struct alignas(64) SurfaceRows {
   float roughness[kWalkBatch] = {}, epsilon[kWalkBatch] = {};
   bool any_gloss = false;
 
-  LUMI_HD void set(int i, const Surface& s) {
+  // `gloss`: is the gloss lobe lit?
+  LUMI_HD void set(int i, const Surface& s, bool gloss = true) {
+    const vec3 lit_specular = gloss ? s.specular : vec3(0);
     for (int axis = 0; axis < 3; ++axis) {
       position[axis][i] = s.position[axis];
       normal[axis][i] = s.normal[axis];
       geometric_normal[axis][i] = s.geometric_normal[axis];
       wo[axis][i] = s.wo[axis];
       diffuse[axis][i] = s.diffuse[axis];
-      specular[axis][i] = s.specular[axis];
+      specular[axis][i] = lit_specular[axis];
     }
     roughness[i] = s.roughness;
     epsilon[i] = s.epsilon;
-    any_gloss = any_gloss || max_component(s.specular) > 0;
+    any_gloss = any_gloss || max_component(lit_specular) > 0;
   }
 };
 
@@ -69,11 +72,12 @@ LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> bsdf_lanes(const SurfaceRows& surfaces, i
   return {f.x + gloss.x, f.y + gloss.y, f.z + gloss.z};
 }
 
-// Shadow rays from the surfaces to points `y`, 1 / `inverse` away, that send `radiance` towards wo. They
-// stop short of the light by the margin of shadow_ray; none where there is nothing to send, or more than a float holds.
+// Shadow rays from the surfaces towards points `y`, as far as `end` of the way, that send `radiance` towards wo. None where
+// there is nothing to send, or more than a float holds.
 template <int L>
-LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> lit_lanes(const SurfaceRows& surfaces, int first, const LaneVec3<L>& radiance,
-                                                 const LaneVec3<L>& y, const Lanes<L>& inverse) {
+LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> lit_lanes_until(const SurfaceRows& surfaces, int first,
+                                                       const LaneVec3<L>& radiance, const LaneVec3<L>& y,
+                                                       const Lanes<L>& end) {
   const Lanes<L> zero = broadcast<L>(0), one = broadcast<L>(1);
   const LaneVec3<L> x = load_rows<L>(surfaces.position, first),
                     geometric = load_rows<L>(surfaces.geometric_normal, first);
@@ -86,9 +90,34 @@ LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> lit_lanes(const SurfaceRows& surfaces, in
   lit.tmin = zero;
   const Lanes<L> strength = max_lanes<L>(radiance.x, max_lanes<L>(radiance.y, radiance.z));
   const Lanes<L> sends = choose_where_greater<L>(broadcast<L>(3e38f), strength, strength, zero);
-  const Lanes<L> end = one - min_lanes<L>(broadcast<L>(0.5f), multiply_add<L>(epsilon, inverse, broadcast<L>(1e-4f)));
   lit.tmax = choose_where_greater<L>(sends, zero, end, zero - one);
   return lit;
+}
+
+// The same to points 1 / `inverse` away: they stop short of the light by the margin of shadow_ray.
+template <int L>
+LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> lit_lanes(const SurfaceRows& surfaces, int first, const LaneVec3<L>& radiance,
+                                                 const LaneVec3<L>& y, const Lanes<L>& inverse) {
+  const Lanes<L> epsilon = load_lanes<L>(surfaces.epsilon + first);
+  const Lanes<L> end =
+      broadcast<L>(1) - min_lanes<L>(broadcast<L>(0.5f), multiply_add<L>(epsilon, inverse, broadcast<L>(1e-4f)));
+  return lit_lanes_until<L>(surfaces, first, radiance, y, end);
+}
+
+// words[w][lane] = word w of the lane's emitter: p0, e1, e2.
+template <int L>
+LUMI_HD LUMI_ALWAYS_INLINE void load_emitters(const Emitter* const* emitters, int first, int count,
+                                              Lanes<L> (&words)[16]) {
+  constexpr int kWords = 9;
+  LUMI_UNROLL(2)
+  for (int part = 0; part < 16; part += L) {
+    LUMI_UNROLL(16)
+    for (int i = 0; i < L; ++i) {
+      const int lane = glm::min(first + i, count - 1);
+      words[part + i] = load_first_lanes<L>(&emitters[lane]->p0.x + part, glm::clamp(kWords - part, 0, L));
+    }
+    transpose_lanes<L>(words + part);
+  }
 }
 
 }  // namespace lumigrove

@@ -1,5 +1,4 @@
-// Light of plain triangles (no texture, no holes) on many surfaces at once: the arithmetic of local_sample, bsdf_eval and
-// shadow_ray, a surface a lane.
+// Light of plain triangles (no texture, no holes) on many surfaces at once: the arithmetic of local_sample, a surface a lane.
 #pragma once
 
 #include "lights/emitter.h"
@@ -32,26 +31,11 @@ struct alignas(64) TriangleLighting {
   }
 };
 
-// words[w][lane] = word w of the lane's emitter: p0, e1, e2.
-template <int L>
-LUMI_HD LUMI_ALWAYS_INLINE void load_emitters(const TriangleLighting& triangles, int first, Lanes<L> (&words)[16]) {
-  constexpr int kWords = 9;
-  LUMI_UNROLL(2)
-  for (int part = 0; part < 16; part += L) {
-    LUMI_UNROLL(16)
-    for (int i = 0; i < L; ++i) {
-      const int lane = glm::min(first + i, triangles.count - 1);
-      words[part + i] = load_first_lanes<L>(&triangles.emitter[lane]->p0.x + part, glm::clamp(kWords - part, 0, L));
-    }
-    transpose_lanes<L>(words + part);
-  }
-}
-
 template <int L>
 LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> light_by_triangles(const TriangleLighting& triangles, int first) {
   const Lanes<L> zero = broadcast<L>(0), one = broadcast<L>(1), tiny = broadcast<L>(1e-37f);
   Lanes<L> words[16];
-  load_emitters<L>(triangles, first, words);
+  load_emitters<L>(triangles.emitter, first, triangles.count, words);
   const LaneVec3<L> p0{words[0], words[1], words[2]}, e1{words[3], words[4], words[5]},
       e2{words[6], words[7], words[8]};
   // A point uniform by area.

@@ -35,6 +35,7 @@ void LightTree::build_over(const Leaves& leaves, std::size_t count, const Box3& 
   view_.weights = options.weights;
   // Not below the smallest distance whose square a float resolves against the scene.
   view_.inside2 = std::max(1e-14f * diagonal * diagonal, 1e-30f);
+  view_.floor2 = std::max(view_.inside2, options.floor * options.floor);
 
   keys_.resize(count);
   launch(static_cast<int>(count), MortonKernel<Leaves>{leaves, bounds.lo, inverse_extent(bounds), keys_}, 4096);

@@ -20,6 +20,7 @@ class LightTree {
     bool cones = true;         // weights bound the emitters' own cosine
     bool keep_leaves = false;  // also store each emitter's leaf, which pdf_light_tree needs: 4 bytes an emitter
     Weights weights = Weights::kMinMax;  // or kYuksel
+    float floor = 0;           // metres, least distance in the weights; above 0 also to boxes that hold the point
   };
   // Buffers are reused by the next build.
   void build(const LightView& lights, const Options& options);

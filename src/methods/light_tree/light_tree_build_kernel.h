@@ -54,10 +54,10 @@ LUMI_HD LUMI_ALWAYS_INLINE void prefetch_emitters(const LightView& lights, std::
   const Emitter& emitter = lights.emitters[keys[leaf + 2 * ahead].index];
   prefetch(&emitter);
   prefetch(&emitter.source);
-  const std::uint32_t source = lights.emitters[keys[leaf + ahead].index].source;
-  if ((source & Emitter::kPunctual) != 0) return;
-  prefetch(&lights.instances[source]);
-  prefetch(&lights.instances[source].masked);
+  const Emitter& next = lights.emitters[keys[leaf + ahead].index];
+  if (!next.triangle()) return;
+  prefetch(&lights.instances[next.source]);
+  prefetch(&lights.instances[next.source].masked);
 }
 
 // The emitters themselves as leaves. Intensities are shares of all local flux.

@@ -13,9 +13,10 @@
 //             rows, with eqs. 1-2, or Yuksel's weights, normalised over W instead of 2; boxes of children that cannot
 //             contribute are near to nothing). Bogus leaves are not stored, except to fill the
 //             last node of a level: their intensity is 0. Emitters of no flux are sorted last and left out. Points
-//             closer than 1e-7 D to a box count as inside it. The horizon test has a relative margin of 1e-6, so
-//             that rounding never makes a light at the horizon impossible. F_j is the highest corner's height over
-//             the nearest distance.
+//             closer than 1e-7 D to a box count as inside it. Virtual point lights lie on the very surfaces that they
+//             light: over them distances have a floor (BoxNearness), and no point counts as inside. The horizon test
+//             has a relative margin of 1e-6, so that rounding never makes a light at the horizon impossible. F_j is
+//             the highest corner's height over the nearest distance. Gloss is not in the weights, as in the paper.
 //             With `cones`, weights also have a bound of the emitters' own cosine, which the paper leaves out: half
 //             of all samples of closed meshes would otherwise fall on emitters that face away.
 // Estimator   unbiased: every emitter that can contribute at x has positive probability, and the probability
@@ -59,6 +60,16 @@ struct alignas(W * sizeof(float)) LightNode {
   std::uint8_t radius[W];                       // in units of 2/kConeRadius
 };
 
+// How near boxes count. Those within inside2 hold the point, and then are the only ones that count; below 0: none do.
+// Others are taken to be no nearer than floor2. m^2.
+struct BoxNearness {
+  float inside2, floor2;
+
+  LUMI_HD BoxNearness(float squared) : inside2(squared), floor2(squared) {}
+  LUMI_HD BoxNearness(float inside_squared, float floor_squared)
+      : inside2(floor_squared > inside_squared ? -1 : inside_squared), floor2(floor_squared) {}
+};
+
 struct LightTreeView {
   const std::byte* nodes = nullptr;              // LightNode<width>, level by level from the root
   const std::uint32_t* leaf_emitters = nullptr;  // leaf -> emitter
@@ -69,8 +80,11 @@ struct LightTreeView {
   std::uint32_t count = 0;                         // leaves
   int root_children = 0;                           // that are not bogus
   float inside2 = 0;                               // squared distance that counts as inside a box, m^2
+  float floor2 = 0;                                // least squared distance in the weights, m^2
   int first_cones = 0;  // first level whose weights bound the emitters' own cosine; `levels` for none
   Weights weights = Weights::kMinMax;  // or kYuksel
+
+  LUMI_HD BoxNearness nearness() const { return {inside2, floor2}; }
 
   // Node k of level l holds children W*k..W*k+W-1 of level l+1.
   template <int W>
@@ -162,10 +176,10 @@ inline constexpr float kHorizonMargin = 2e-6f;
 // `cones` is asked for ConeLanes only when `use_cones`.
 template <int W, class Cones>
 LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, bool use_cones, const Cones& cones,
-                                                     float inside2, const LaneVec3<W>& x, const LaneVec3<W>& n,
+                                                     BoxNearness nearness, const LaneVec3<W>& x, const LaneVec3<W>& n,
                                                      Weights weights = Weights::kMinMax,
                                                      float horizon_margin = kHorizonMargin) {
-  const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), inside = broadcast<W>(inside2);
+  const Lanes<W> zero = broadcast<W>(0), one = broadcast<W>(1), floor2 = broadcast<W>(nearness.floor2);
   const LaneVec3<W>& half = box.half;
   const LaneVec3<W> to_centre{box.centre.x - x.x, box.centre.y - x.y, box.centre.z - x.z};
   const LaneVec3<W> apart = abs_lanes<W>(to_centre);
@@ -173,9 +187,10 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
                             max_lanes<W>(apart.z - half.z, zero)};
   const LaneVec3<W> farthest{apart.x + half.x, apart.y + half.y, apart.z + half.z};
   const Lanes<W> near2 = dot<W>(nearest, nearest), far2 = dot<W>(farthest, farthest);
-  const Lanes<W> inverse_near = reciprocal_sqrt<W>(max_lanes<W>(near2, inside));
-  const Lanes<W> inverse_far = reciprocal_sqrt<W>(max_lanes<W>(far2, inside));
-  const Lanes<W> far = far2 * inverse_far;
+  const Lanes<W> bounded_far2 = max_lanes<W>(far2, floor2);
+  const Lanes<W> inverse_near = reciprocal_sqrt<W>(max_lanes<W>(near2, floor2));
+  const Lanes<W> inverse_far = reciprocal_sqrt<W>(bounded_far2);
+  const Lanes<W> far = bounded_far2 * inverse_far;
 
   // Height of the box's highest corner above the tangent plane.
   const Lanes<W> margin = far * horizon_margin;
@@ -188,7 +203,7 @@ LUMI_HD LUMI_ALWAYS_INLINE BoxWeights<W> weigh_boxes(const BoxLanes<W>& box, boo
   }
   const Lanes<W> plain_inside = weights == Weights::kYuksel
                                     ? choose_where_greater<W>(dot<W>(half, half) * 4.0f, near2, shining, zero)
-                                    : keep_if_not_above<W>(near2, inside, shining);
+                                    : keep_if_not_above<W>(near2, broadcast<W>(nearness.inside2), shining);
   return {shining * (inverse_near * inverse_near), shining * (inverse_far * inverse_far), shining, plain_inside};
 }
 
@@ -211,12 +226,12 @@ LUMI_HD inline Lanes<W> lanes_in_range(int first, int count) {
 struct Weighing {
   Weights weights = Weights::kMinMax;  // or kYuksel
   bool cones = true;                   // weights bound the emitters' own cosine
-  float inside2 = 0;                   // squared distance that counts as inside a box, m^2
+  BoxNearness nearness = 0.0f;
   float horizon_margin = kHorizonMargin;
 };
 
 LUMI_HD LUMI_ALWAYS_INLINE Weighing weighing_of_level(const LightTreeView& tree, int level, Weights weights) {
-  return {weights, level >= tree.first_cones, tree.inside2};
+  return {weights, level >= tree.first_cones, tree.nearness()};
 }
 
 // Equations 1 and 2 for the W children of a node at once. `lanes` are the node's boxes, those that do not count without intensity.
@@ -224,7 +239,7 @@ template <int W>
 LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children(BoxLanes<W> lanes, const LightNode<W>& node,
                                                           const Weighing& weighing, vec3 x, vec3 n) {
   const BoxWeights<W> boxes = weigh_boxes<W>(
-      lanes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.inside2, broadcast<W>(x), broadcast<W>(n),
+      lanes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.nearness, broadcast<W>(x), broadcast<W>(n),
       weighing.weights, weighing.horizon_margin);
   const bool is_inside = greater_bits<W>(boxes.inside, broadcast<W>(0)) != 0;
   if (weighing.weights == Weights::kYuksel) {
@@ -323,7 +338,7 @@ LUMI_HD inline void step_from_start(const LightTreeView& tree, Subtree start, co
   for (int c = 0; c < W; ++c) near[c] = far[c] = inside[c] = zero;
   for (int c = begin; c < end; ++c) {
     const BoxWeights<P> box = weigh_boxes<P>(
-        broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.inside2,
+        broadcast_box<P>(node, c), start.level >= tree.first_cones, [&] { return broadcast_cone<P>(node, c); }, tree.nearness(),
         x, n, kWeights);
     near[c] = box.near;
     far[c] = box.far;

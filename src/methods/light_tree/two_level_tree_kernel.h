@@ -204,7 +204,7 @@ LUMI_HD inline void sample_one_mesh(const MeshTreesView& below, const TreeStart&
 
 // Number in MeshTreesView::instances of the leaf that holds an emitter.
 LUMI_HD inline std::uint32_t instance_of_emitter(const MeshTreesView& below, const Emitter& emitter) {
-  return emitter.punctual() ? below.punctual_first + (emitter.source & ~Emitter::kPunctual)
+  return emitter.punctual() ? below.punctual_first + emitter.index()
                             : below.instance_numbers[emitter.source];
 }
 

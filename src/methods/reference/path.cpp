@@ -100,9 +100,7 @@ void PathBuffers::add_counters(const PathBuffers& other) {
   scatter_ms += other.scatter_ms;
   trace_ms += other.trace_ms;
   arrive_ms += other.arrive_ms;
-  direct.rays += other.direct.rays;
-  direct.select_ms += other.direct.select_ms;
-  direct.trace_ms += other.direct.trace_ms;
+  direct.add_counters(other.direct);
 }
 
 void add_path_light(const PathTracing& tracing, std::span<const Surface> surfaces,

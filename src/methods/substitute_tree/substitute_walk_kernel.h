@@ -35,7 +35,7 @@ namespace lumigrove {
 
 struct SubstituteWalk {
   SubstituteTreeView tree;
-  IndirectWeights weight = IndirectWeights::kDistanceBounded;
+  Weights weight = Weights::kDistanceBounded;
   float floor2 = 0;        // epsilon^2, m^2: least squared distance
   bool cones = false;      // bound the cosine at the lights
   bool substitutes = true; // stop at usable nodes
@@ -316,7 +316,7 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildShine<L> shine_of_child(const SubstituteWalk& wa
     result.shine = result.shine * gloss_towards<L>(walks, direction_in_box<L>(walks.mirror, child.lo, child.hi));
   result.mean2 = dot<L>(child.mean, child.mean);
   result.near2 = result.diagonal2 = zero;
-  if (walk.cones || walk.weight != IndirectWeights::kDistanceBounded) {
+  if (walk.cones || walk.weight != Weights::kDistanceBounded) {
     const BoxDistances<L> distances = box_distances<L>(centre, half);
     result.near2 = distances.near2;
     result.diagonal2 = dot<L>(half, half) * 4.0f;
@@ -342,10 +342,10 @@ LUMI_HD LUMI_ALWAYS_INLINE PairWeights<L> weigh_children(const SubstituteWalk& w
   const ChildShine<L> a = shine_of_child<L, kGloss>(walk, walks, left);
   const ChildShine<L> b = shine_of_child<L, kGloss>(walk, walks, right);
   const Lanes<L> floor2 = broadcast<L>(walk.floor2), one = broadcast<L>(1), zero = broadcast<L>(0);
-  if (walk.weight == IndirectWeights::kDistanceBounded)
+  if (walk.weight == Weights::kDistanceBounded)
     return {a.shine * max_lanes<L>(b.mean2, floor2), b.shine * max_lanes<L>(a.mean2, floor2)};
   Lanes<L> divide_a, divide_b;
-  if (walk.weight == IndirectWeights::kInBox) {
+  if (walk.weight == Weights::kInBox) {
     const Lanes<L> inside2 = broadcast<L>(walk.inside2);
     divide_a = choose_where_greater<L>(a.near2, zero, max_lanes<L>(a.mean2, floor2), inside2);
     divide_b = choose_where_greater<L>(b.near2, zero, max_lanes<L>(b.mean2, floor2), inside2);

@@ -15,9 +15,12 @@ constexpr std::uint32_t kDimArrivalDirect = 4, kDimArrivalIndirect = kDimensions
 
 void light_arrivals(const Gather& gather, std::uint32_t dimension, GatherBuffers& b, std::span<vec3> sum) {
   b.light.assign(b.next_surfaces.size(), vec3(0));
-  add_direct_light(gather.direct, b.next_surfaces, b.next_pixels, dimension + kDimArrivalDirect, b.direct, b.light);
+  // No second ray: mirrors are lit like all else.
+  DirectLighting direct = gather.direct;
   IndirectLighting indirect = gather.indirect;
-  indirect.sampler.mirror_roughness = 0;  // no second ray
+  direct.sampler.vpl_mirror_roughness = 0;
+  indirect.sampler.mirror_roughness = indirect.light_tree.sampler.vpl_mirror_roughness = 0;
+  add_direct_light(direct, b.next_surfaces, b.next_pixels, dimension + kDimArrivalDirect, b.direct, b.light);
   add_indirect_light(indirect, b.next_surfaces, b.next_pixels, dimension + kDimArrivalIndirect, b.indirect, b.light);
   launch(static_cast<int>(b.next_surfaces.size()), GatherCarryKernel{b.next_states, b.light, sum});
 }
@@ -64,9 +67,7 @@ void GatherBuffers::add_counters(const GatherBuffers& other) {
   rays_traced += other.rays_traced;
   trace_ms += other.trace_ms;
   surface_ms += other.surface_ms;
-  direct.rays += other.direct.rays;
-  direct.select_ms += other.direct.select_ms;
-  direct.trace_ms += other.direct.trace_ms;
+  direct.add_counters(other.direct);
   indirect.add_counters(other.indirect);
 }
 

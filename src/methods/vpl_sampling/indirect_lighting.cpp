@@ -48,9 +48,11 @@ void add_one_sample(const Batch& batch, const VplSampler& sampler, std::uint32_t
 }  // namespace
 
 void IndirectBuffers::add_counters(const IndirectBuffers& other) {
-  rays += other.rays;
-  select_ms += other.select_ms;
-  trace_ms += other.trace_ms;
+  rays += other.rays + other.light_tree.rays;
+  select_ms += other.select_ms + other.light_tree.select_ms;
+  trace_ms += other.trace_ms + other.light_tree.trace_ms;
+  light_tree.cut_ms += other.light_tree.cut_ms;
+  light_tree.split_ms += other.light_tree.split_ms;
 }
 
 void add_indirect_light(const IndirectLighting& lighting, std::span<const Surface> surfaces,
@@ -58,6 +60,10 @@ void add_indirect_light(const IndirectLighting& lighting, std::span<const Surfac
                         std::span<vec3> sum) {
   const std::size_t n = surfaces.size();
   if (buffers.wants_traces) buffers.traces.assign(n, {});
+  if (lighting.use_light_tree) {
+    add_direct_light(lighting.light_tree, surfaces, pixels, dimension, buffers.light_tree, sum);
+    return;
+  }
   const auto lights = static_cast<std::uint32_t>(lighting.sampler.lights.vpls.size());
   if (lights == 0) return;
   buffers.shadow.resize(n);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/rng.h"
+#include "methods/light_sampling/direct_lighting.h"
 #include "methods/vpl_sampling/indirect_lighting_kernel.h"
 #include "scene/surface.h"
 #include "trace/trace.h"
@@ -20,6 +21,9 @@ struct IndirectLighting {
   Rng rng;           // seed and frame; the pixel is set for each surface
   int spp = 1;       // samples a surface, averaged
   bool all = false;  // instead: every light, summed (the oracle)
+  // Instead, where `use_light_tree`: the lights are emitters of a light set, chosen as those of direct light.
+  bool use_light_tree = false;
+  DirectLighting light_tree;
 };
 
 // Working memory, reused from batch to batch. `rays` counts the shadow rays traced. `traces` is filled, by the first
@@ -30,9 +34,11 @@ struct IndirectBuffers {
   std::vector<std::uint8_t> occluded, corrected;
   std::vector<VplTrace> traces;
   bool wants_traces = false;
+  DirectBuffers light_tree;
   std::uint64_t rays = 0;
   double select_ms = 0, trace_ms = 0;
 
+  // Those of `light_tree` are among the others afterwards.
   void add_counters(const IndirectBuffers& other);
 };
 

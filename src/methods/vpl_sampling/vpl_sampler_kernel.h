@@ -79,7 +79,7 @@ LUMI_HD inline Ray vpl_shadow_ray(const Surface& surface, const VplPoint& light)
 }
 
 LUMI_HD inline bool lights_gloss(const VplSampler& sampler, const Surface& s) {
-  return sampler.gloss && s.roughness > sampler.mirror_roughness && has_gloss(s);
+  return vpls_light_gloss(sampler.gloss, sampler.mirror_roughness, s);
 }
 
 // Probability of lighting the diffuse lobe when the two are lit one at a time.
