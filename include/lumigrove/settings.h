@@ -36,6 +36,8 @@ struct SelectionSettings {
   int cut_interleave = 1;       // m: the pixels of m x m share out a cut's nodes
   float cut_floor = 0.001f;     // least distance in the bound, in units of the diagonal of the lights' box
   CutBound cut_bound = CutBound::kChildren;
+  // Pools (kPool): areas of (cut_share * cut_interleave)^2 pixels share cut_interleave^2 / 2 pools
+  int pool = 64;                // lights of a pool, of which every pixel takes spp: 16, 32, 48, 64
   // Adaptive tree splitting (kSaoh, kAgglomerative)
   float split = 0;              // threshold: one sample below each part of a split tree; 0 = no splitting
   int split_cap = 16;           // most parts, at most 64
@@ -44,8 +46,6 @@ struct SelectionSettings {
 // Light that reaches a surface straight from an emitter.
 struct DirectSettings : SelectionSettings {
   bool mis = false;             // combine with BSDF sampling (balance heuristic)
-  // Pools (kPool): lights are drawn for every cut_share x cut_share pixels, each of which takes spp of them
-  int pool = 64;                // lights of a pool: 16, 32, 48, 64
 };
 
 // Light that reaches a surface from other surfaces. Lengths are in units of the scene's diagonal D. The selection is among

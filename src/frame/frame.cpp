@@ -122,7 +122,8 @@ void light_tile(const World& world, const Settings& settings, DirectLighting dir
     launch(count, EmissionKernel{scene, lights, settings.light_scale, b.rays, b.surfaces, b.emission});
   });
 
-  direct.lookup.window = direct.pools.areas.window = indirect.light_tree.lookup.window = tile;
+  direct.lookup.window = direct.pools.areas.window = tile;
+  indirect.light_tree.lookup.window = indirect.light_tree.pools.areas.window = tile;
   b.direct_buffers.vpl_sum = settings.indirect.joint ? std::span<vec3>(b.indirect) : std::span<vec3>();
   add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, direct, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,
@@ -287,6 +288,7 @@ void set_selection(const SelectionSettings& settings, const Settings& frame, int
     case Selection::kPool:
       sampler.choice = LightChoice::kTree;
       lighting.use_pools = true;
+      lighting.pools.size = settings.pool;
       lighting.pools.interleave = settings.cut_interleave;
       lighting.pools.areas.share = settings.cut_share * settings.cut_interleave;
       lighting.pools.areas.frame = static_cast<std::uint32_t>(frame.frame) + static_cast<std::uint32_t>(sample);
@@ -475,7 +477,6 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   sampler.bvh = world.bvh.view();
   direct.tracer = &world.tracer;
   direct.mis = settings.direct.mis;
-  direct.pools.size = settings.direct.pool;
   set_selection(settings.direct, settings, sample, direct);
   return direct;
 }
@@ -531,6 +532,7 @@ void render_sample(const World& world, const Settings& settings, int sample, Fil
   if (settings.indirect.transport == Transport::kVpl) {
     const IndirectBuffers& vpls = sum.indirect_buffers;
     if (indirect.light_tree.use_split) add_pass(stats, "VPL splitting", vpls.light_tree.split_ms, 0);
+    if (indirect.light_tree.use_pools) add_pass(stats, "VPL pools", vpls.light_tree.pool_ms, 0);
     if (indirect.light_tree.use_cuts) add_pass(stats, "VPL cuts", vpls.light_tree.cut_ms, 0);
     if (!settings.indirect.joint) {
       add_pass(stats, "VPL selection", vpls.select_ms, 0);

@@ -228,6 +228,12 @@ std::vector<Setting> selection_rows(const std::string& prefix, Group of) {
       integer(
           prefix + ".spp", [=](auto& s) -> auto& { return of(s).spp; }, {1, 4096}, "samples",
           "Light samples for each camera sample"),
+      choice(
+          prefix + ".pool", [=](auto& s) -> auto& { return of(s).pool; },
+          std::vector<std::pair<std::string, int>>{{"16", 16}, {"32", 32}, {"48", 48}, {"64", 64}},
+          fmt::format("Lights of a pool, drawn below the nodes of an area's cut; every pixel takes {0}.spp of them. Areas are "
+                      "cut_share x cut_interleave pixels wide and have cut_interleave^2 / 2 pools",
+                      prefix)),
       integer(
           prefix + ".cut_share", [=](auto& s) -> auto& { return of(s).cut_share; }, {1, 64}, "pixels",
           fmt::format("Edge of the blocks of pixels that share a cut; {}.spp is the number of the cut's nodes", prefix)),
@@ -268,7 +274,7 @@ std::vector<Setting> direct_rows() {
                                           {"cut", Selection::kCut},
                                           {"pool", Selection::kPool}},
           "How emitters are chosen: each alike, by flux, walking the hierarchy from its root, all of them, walking it "
-          "from every node of a cut, or among lights that were drawn for a block of pixels"),
+          "from every node of a cut, or among lights that were drawn for an area of pixels"),
       choice(
           "direct.hierarchy", [](auto& s) -> auto& { return s.direct.hierarchy; },
           vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
@@ -289,10 +295,6 @@ std::vector<Setting> direct_rows() {
       flag(
           "direct.mis", [](auto& s) -> auto& { return s.direct.mis; },
           "Combine light samples with BSDF samples (balance heuristic)"),
-      choice(
-          "direct.pool", [](auto& s) -> auto& { return s.direct.pool; },
-          vector<pair<string, int>>{{"16", 16}, {"32", 32}, {"48", 48}, {"64", 64}},
-          "Lights that are drawn for a block of cut_share x cut_share pixels; every pixel takes direct.spp of them"),
   };
 }
 
@@ -336,9 +338,10 @@ std::vector<Setting> vpl_rows() {
                                           {"power", Selection::kPower},
                                           {"root", Selection::kRoot},
                                           {"all", Selection::kAll},
-                                          {"cut", Selection::kCut}},
-          "How VPLs are chosen: each alike, by power, walking the hierarchy from its root, all of them, or walking it from "
-          "every node of a cut"),
+                                          {"cut", Selection::kCut},
+                                          {"pool", Selection::kPool}},
+          "How VPLs are chosen: each alike, by power, walking the hierarchy from its root, all of them, walking it from "
+          "every node of a cut, or among lights that were drawn for an area of pixels"),
       choice(
           "indirect.hierarchy", [](auto& s) -> auto& { return s.indirect.hierarchy; },
           vector<pair<string, Hierarchy>>{{"none", Hierarchy::kNone},
@@ -476,14 +479,14 @@ void check_cuts(const std::string& prefix, const SelectionSettings& s) {
     throw Error(fmt::format("a cut has at most {} nodes, but {}.spp is {}", kMaxCut, prefix, s.spp));
 }
 
-void check_pools(const DirectSettings& s) {
+void check_pools(const std::string& prefix, const SelectionSettings& s) {
   if (s.selection != Selection::kPool) return;
   if (s.hierarchy != Hierarchy::kPerfect)
-    throw Error("direct.selection 'pool' draws its lights from the perfect tree only; set direct.hierarchy 'perfect'");
+    throw Error(fmt::format("{0}.selection 'pool' draws its lights from the perfect tree only; set {0}.hierarchy 'perfect'",
+                            prefix));
   if (s.cut_interleave > kMaxPoolInterleave)
-    throw Error(fmt::format("direct.selection 'pool' interleaves at most {0} x {0} pixels, but direct.cut_interleave is {1}",
-                            kMaxPoolInterleave, s.cut_interleave));
-  if (s.mis) throw Error("direct.mis does not combine with pools; set direct.selection 'root' or 'cut', or direct.mis false");
+    throw Error(fmt::format("{0}.selection 'pool' interleaves at most {1} x {1} pixels, but {0}.cut_interleave is {2}",
+                            prefix, kMaxPoolInterleave, s.cut_interleave));
 }
 
 // Weights that a hierarchy can have, in the words of the rows.
@@ -510,7 +513,8 @@ void check_weights(const std::string& prefix, const Settings& all, const Selecti
 void check_selection(const std::string& prefix, const Settings& all, const SelectionSettings& s) {
   check_hierarchy(prefix, s);
   check_cuts(prefix, s);
-  if (s.selection != Selection::kRoot && s.selection != Selection::kCut) return;
+  check_pools(prefix, s);
+  if (s.selection != Selection::kRoot && s.selection != Selection::kCut && s.selection != Selection::kPool) return;
   check_weights(prefix, all, s);
   if (s.split > 0 && !is_bvh(s.hierarchy))
     throw Error(
@@ -523,9 +527,6 @@ void check_joint(const Settings& s) {
   if (s.indirect.transport != Transport::kVpl)
     throw Error(fmt::format("indirect.joint puts VPLs among the lights, but indirect.transport is '{}'; use 'vpl'",
                             get_value(s, "indirect.transport")));
-  if (s.direct.selection == Selection::kPool)
-    throw Error("indirect.joint does not combine with pools, which hold no VPLs; set direct.selection 'root' or 'cut', or "
-                "indirect.joint false");
   const bool walks = s.direct.selection == Selection::kRoot || s.direct.selection == Selection::kCut;
   if (s.direct.hierarchy == Hierarchy::kTwoLevel && walks)
     throw Error("indirect.joint needs one tree over all lights, but direct.hierarchy is 'two-level'; use 'perfect', 'saoh' "
@@ -537,7 +538,8 @@ void check_vpls(const Settings& all) {
   if (s.joint) check_joint(all);
   if (s.transport != Transport::kVpl) return;
   if (!s.joint) check_selection("indirect", all, s);
-  const bool walks = !s.joint && (s.selection == Selection::kRoot || s.selection == Selection::kCut);
+  const bool walks = !s.joint && (s.selection == Selection::kRoot || s.selection == Selection::kCut ||
+                                  s.selection == Selection::kPool);
   const bool substitute_tree = walks && s.hierarchy == Hierarchy::kSubstitute;
   if (s.correction > 0 && !(substitute_tree && s.stop == Stop::kSubstitute))
     throw Error("indirect.correction corrects substitutes, but none are used; set indirect.joint false, indirect.selection "
@@ -571,8 +573,8 @@ const std::vector<PresetInfo>& presets() {
         {"direct.cut_share", "8"},
         {"indirect.transport", "none"}}},
       {"pool",
-       "Lights drawn for every 8x8 pixels from the perfect light tree, 8 of them taken by each pixel by what they would send "
-       "unoccluded; direct light only",
+       "Lights drawn for every 16x16 pixels below a cut of the perfect light tree, 8 of them taken by each pixel by what they "
+       "would send unoccluded; direct light only",
        "of this project, from D. Lin, C. Yuksel: Real-Time Stochastic Lightcuts, 2020, and J. Talbot, D. Cline, P. Egbert: "
        "Importance Resampling for Global Illumination. EGSR 2005",
        {{"direct.selection", "pool"},
@@ -683,7 +685,8 @@ void check(const Settings& s) {
   check_image(s);
   if (s.view) check_view(*s.view);
   check_selection("direct", s, s.direct);
-  check_pools(s.direct);
+  if (s.direct.selection == Selection::kPool && s.direct.mis)
+    throw Error("direct.mis does not combine with pools; set direct.selection 'root' or 'cut', or direct.mis false");
   check_vpls(s);
 }
 

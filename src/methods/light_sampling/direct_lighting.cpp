@@ -27,6 +27,22 @@ void trace_shadow_rays(const DirectLighting& lighting, DirectBuffers& buffers) {
   for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
 }
 
+// Rays first_ray, ..., first_ray + count - 1 are those of surfaces first_surface, ...
+void add_unoccluded(const DirectBuffers& buffers, std::size_t first_ray, std::size_t count, std::size_t first_surface,
+                    std::span<vec3> sum) {
+  const auto light = std::span<const vec3>(buffers.contribution).subspan(first_ray, count);
+  const auto occluded = std::span<const std::uint8_t>(buffers.occluded).subspan(first_ray, count);
+  const auto of_surfaces = sum.subspan(first_surface, count);
+  if (buffers.vpl_sum.empty()) {
+    launch(static_cast<int>(count), AddUnoccludedKernel{light, occluded, of_surfaces});
+    return;
+  }
+  launch(static_cast<int>(count),
+         AddUnoccludedByKindKernel{light, occluded,
+                                   std::span<const std::uint8_t>(buffers.from_vpl).subspan(first_ray, count),
+                                   of_surfaces, buffers.vpl_sum.subspan(first_surface, count)});
+}
+
 // `scale`: 1 / samples.
 void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler, float scale, const CutSamples& cuts,
                     const SplitSamples& split, Stratum stratum,
@@ -42,11 +58,7 @@ void add_one_sample(const DirectLighting& lighting, const LightSampler& sampler,
            kLaunchGrain / kWalkBatch);
   }
   trace_shadow_rays(lighting, buffers);
-  if (buffers.vpl_sum.empty())
-    launch(count, AddUnoccludedKernel{buffers.contribution, buffers.occluded, sum});
-  else
-    launch(count, AddUnoccludedByKindKernel{buffers.contribution, buffers.occluded, buffers.from_vpl, sum,
-                                            buffers.vpl_sum});
+  add_unoccluded(buffers, 0, surfaces.size(), 0, sum);
 }
 
 // One sample below each node of the cuts; lights at infinity have a sample in every pass.
@@ -102,7 +114,8 @@ constexpr std::size_t kSurfacesOfPools = 512;
 // `spp` of the lights that were drawn for the surface's area. `lookup`: of these surfaces.
 void add_pool_samples_of_strip(const DirectLighting& lighting, const PoolLookup& lookup,
                                std::span<const Surface> surfaces, std::span<const std::uint32_t> pixels,
-                               std::uint32_t dimension, DirectBuffers& buffers, std::span<vec3> sum) {
+                               std::uint32_t dimension, std::size_t first_of_tile, DirectBuffers& buffers,
+                               std::span<vec3> sum) {
   {
     const ScopedTimer timer(buffers.pool_ms);
     buffers.pools.resize(static_cast<std::size_t>(lookup.pools()));
@@ -114,19 +127,16 @@ void add_pool_samples_of_strip(const DirectLighting& lighting, const PoolLookup&
     buffers.shadow.resize(rays);
     buffers.contribution.resize(rays);
     buffers.occluded.resize(rays);
+    buffers.from_vpl.resize(buffers.vpl_sum.empty() ? 0 : rays);
     {
       const ScopedTimer timer(buffers.select_ms);
       launch(walk_batches(static_cast<int>(count)),
              PoolLightKernel{lighting.sampler, lookup, lighting.rng, dimension, lighting.spp, static_cast<int>(first),
                              surfaces.subspan(first, count), pixels.subspan(first, count), buffers.pools,
-                             buffers.shadow, buffers.contribution});
+                             buffers.shadow, buffers.contribution, buffers.from_vpl});
     }
     trace_shadow_rays(lighting, buffers);
-    for (std::size_t s = 0; s < samples; ++s)
-      launch(static_cast<int>(count),
-             AddUnoccludedKernel{std::span<const vec3>(buffers.contribution).subspan(s * count, count),
-                                 std::span<const std::uint8_t>(buffers.occluded).subspan(s * count, count),
-                                 sum.subspan(first, count)});
+    for (std::size_t s = 0; s < samples; ++s) add_unoccluded(buffers, s * count, count, first_of_tile + first, sum);
   }
 }
 
@@ -144,7 +154,7 @@ void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> s
     if (together) lookup.areas.window.y1 = std::min(window.y1, (y / edge + 1) * edge);
     const auto count = static_cast<std::size_t>(lookup.areas.window.count());
     add_pool_samples_of_strip(lighting, lookup, surfaces.subspan(first, count), pixels.subspan(first, count),
-                              dimension, buffers, sum.subspan(first, count));
+                              dimension, first, buffers, sum);
     first += count;
     y = lookup.areas.window.y1;
   }

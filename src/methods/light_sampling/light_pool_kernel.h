@@ -42,14 +42,17 @@ struct alignas(64) PoolLight {
   float two_sided;        // 1 or -1
   float squared;          // 1: the share is squared, 0: it is not
   float inverse_range2;   // 1/m^2; 0 = unlimited
-  float unused[2];
+  float clear;            // shadow rays end so far along the axis, metres; above 0 for virtual point lights
+  float most;             // of share / d^2, 1/m^2: the clamp of virtual point lights
+
+  LUMI_HD bool vpl() const { return clear > 0; }
 };
 
 struct alignas(64) LightPool {
   float x[kMaxPool], y[kMaxPool], z[kMaxPool];
   float axis_x[kMaxPool], axis_y[kMaxPool], axis_z[kMaxPool];
   float strength[kMaxPool];  // Y
-  float offset[kMaxPool], scale[kMaxPool], two_sided[kMaxPool];
+  float offset[kMaxPool], scale[kMaxPool], two_sided[kMaxPool], most[kMaxPool];
   PoolLight lights[kMaxPool];
 
   LUMI_HD void set(int j, const PoolLight& light) {
@@ -57,7 +60,7 @@ struct alignas(64) LightPool {
     x[j] = light.position.x, y[j] = light.position.y, z[j] = light.position.z;
     axis_x[j] = light.axis.x, axis_y[j] = light.axis.y, axis_z[j] = light.axis.z;
     strength[j] = luminance(light.strength);
-    offset[j] = light.offset, scale[j] = light.scale, two_sided[j] = light.two_sided;
+    offset[j] = light.offset, scale[j] = light.scale, two_sided[j] = light.two_sided, most[j] = light.most;
   }
 };
 
@@ -125,6 +128,7 @@ LUMI_HD inline PoolLight punctual_pool_light(const LightView& lights, const Emit
   if (light.spot) result.axis = e.e1;
   result.two_sided = -1;
   result.squared = light.spot ? 1.0f : 0.0f;
+  result.most = 3e38f;
   result.inverse_range2 = light.range > 0 ? 1 / (light.range * light.range) : 0.0f;
   return result;
 }
@@ -142,6 +146,7 @@ LUMI_HD inline PoolLight triangle_pool_light(const SceneView& scene, const Light
   result.axis = n * (1 / area2);
   result.strength = instance.radiance * (0.5f * area2 * weight);
   result.scale = 1;
+  result.most = 3e38f;
   result.two_sided = instance.double_sided ? 1.0f : -1.0f;
   if (instance.textured || instance.masked) {
     const MeshPoint point = mesh_point(scene, instance, e, index, b1, b2);
@@ -151,13 +156,26 @@ LUMI_HD inline PoolLight triangle_pool_light(const SceneView& scene, const Light
   return result;
 }
 
-// What a walk chose, as one of `draws` lights of a pool; dark where it chose none.
+LUMI_HD inline PoolLight vpl_pool_light(const LightView& lights, const Emitter& e, float weight) {
+  PoolLight result{};
+  result.position = e.p0;
+  result.axis = e.e1;
+  result.strength = e.e2 * weight;
+  result.scale = 1;
+  result.two_sided = -1;
+  result.clear = glm::max(lights.vpls[e.index()].epsilon, 1e-37f);
+  result.most = glm::min(lights.vpl_clamp, 3e38f);
+  return result;
+}
+
+// What a walk chose, as a light of a pool; dark where it chose none.
 LUMI_HD inline PoolLight make_pool_light(const LightSampler& sampler, TreeSample chosen, vec2 u) {
   PoolLight light{};
   if (chosen.pdf > 0) {
     const float weight = 1 / chosen.pdf;
     const Emitter& e = sampler.lights.emitters[chosen.emitter];
-    light = e.punctual() ? punctual_pool_light(sampler.lights, e, weight)
+    light = e.vpl()      ? vpl_pool_light(sampler.lights, e, weight)
+            : e.punctual() ? punctual_pool_light(sampler.lights, e, weight)
                          : triangle_pool_light(sampler.scene, sampler.lights, chosen.emitter, u, weight);
   }
   if (!is_finite(light.strength)) light.strength = vec3(0);
@@ -194,7 +212,7 @@ struct CutOfRegion {
     const Subtree& s = start.subtree;
     if (is_leaf(tree, s)) return 0;
     Weighing weighing = weighing_of_level(tree, s.level, Weights::kMinMax);
-    weighing.inside2 = floor2;
+    weighing.nearness = floor2;
     alignas(64) float errors[W];
     store_lanes<W>(bound_children_of_region<W>(tree.level<W>(s.level)[s.node], weighing, region), errors);
     float sum = 0;
@@ -237,7 +255,7 @@ struct PoolKernel {
     const WalkRegion region{bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
     AreaCut cut;
     with_width(tree.width, [&](auto w) {
-      const float floor2 = glm::max(tree.inside2, length_squared(region.half));
+      const float floor2 = glm::max(glm::max(tree.inside2, tree.floor2), length_squared(region.half));
       select_cut(CutOfRegion<w>{tree, region, floor2}, lookup.size, cut);
     });
     const int many = lookup.pools_per_area();

@@ -29,7 +29,8 @@ LUMI_HD LUMI_ALWAYS_INLINE Lanes<L> pool_weights(const LightPool& pool, int firs
   const Lanes<L> share = multiply_add<L>(cosine, load_lanes<L>(pool.scale + first), load_lanes<L>(pool.offset + first));
   const Lanes<L> facing = min_lanes<L>(max_lanes<L>(share, zero), one);
   const Lanes<L> cos_surface = max_lanes<L>(dot<L>(n, d) * inverse, zero);
-  const Lanes<L> weight = load_lanes<L>(pool.strength + first) * facing * cos_surface * (inverse * inverse);
+  const Lanes<L> received = min_lanes<L>(facing * (inverse * inverse), load_lanes<L>(pool.most + first));
+  const Lanes<L> weight = load_lanes<L>(pool.strength + first) * cos_surface * received;
   return choose_where_greater<L>(broadcast<L>(1e36f), weight, weight, zero);
 }
 
@@ -85,9 +86,11 @@ LUMI_HD LUMI_ALWAYS_INLINE void load_pool_lights(const PoolLight* const* lights,
   }
 }
 
+// `vpl_gloss`: 1 for surfaces whose gloss virtual point lights light too, else 0.
 template <int L>
 LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> light_by_pool(const SurfaceRows& surfaces, int first,
-                                                     const PoolLight* const* lights, const float* weights) {
+                                                     const PoolLight* const* lights, const float* weights,
+                                                     const float* vpl_gloss) {
   const Lanes<L> zero = broadcast<L>(0), one = broadcast<L>(1), tiny = broadcast<L>(1e-37f);
   Lanes<L> words[16];
   load_pool_lights<L>(lights, words);
@@ -108,10 +111,19 @@ LUMI_HD LUMI_ALWAYS_INLINE LitLanes<L> light_by_pool(const SurfaceRows& surfaces
   const Lanes<L> least = min_lanes<L>(min_lanes<L>(facing, d2 - tiny),
                                       min_lanes<L>(cos_surface, dot<L>(geometric, wi)));
   const Lanes<L> factor = choose_where_greater<L>(
-      least, zero, load_lanes<L>(weights) * cos_surface * facing * window * (inverse * inverse), zero);
-  const LaneVec3<L> f = bsdf_lanes<L>(surfaces, first, n, wi, cos_surface);
-  return lit_lanes<L>(surfaces, first, {strength.x * f.x * factor, strength.y * f.y * factor, strength.z * f.z * factor},
-                      y, inverse);
+      least, zero, load_lanes<L>(weights) * cos_surface * window * min_lanes<L>(facing * (inverse * inverse), words[15]),
+      zero);
+  const Lanes<L> clear = words[14], gloss = choose_where_greater<L>(clear, zero, load_lanes<L>(vpl_gloss), one);
+  const LaneVec3<L> f = bsdf_lanes<L>(surfaces, first, n, wi, cos_surface, gloss);
+  // Rays to virtual point lights end off the light's surface, to others short of it.
+  const Lanes<L> margin = min_lanes<L>(
+      broadcast<L>(0.5f), multiply_add<L>(load_lanes<L>(surfaces.epsilon + first), inverse, broadcast<L>(1e-4f)));
+  const Lanes<L> end = choose_where_greater<L>(clear, zero, one, one - margin);
+  const LaneVec3<L> target{multiply_add<L>(axis.x, clear, y.x), multiply_add<L>(axis.y, clear, y.y),
+                           multiply_add<L>(axis.z, clear, y.z)};
+  return lit_lanes_until<L>(surfaces, first,
+                            {strength.x * f.x * factor, strength.y * f.y * factor, strength.z * f.z * factor}, target,
+                            end);
 }
 
 // surfaces[i] -> shadow[s * surfaces + i] and contribution likewise, s < samples: rays that carry nothing are marked
@@ -128,18 +140,25 @@ struct PoolLightKernel {
   std::span<const LightPool> pools;
   std::span<Ray> shadow;
   std::span<vec3> contribution;
+  std::span<std::uint8_t> from_vpl = {};  // likewise: is it the light of a virtual point light? Empty: not wanted
 
   LUMI_HD void operator()(int batch) const {
     const std::size_t first = static_cast<std::size_t>(batch) * kWalkBatch;
     const int count = static_cast<int>(glm::min<std::size_t>(kWalkBatch, surfaces.size() - first));
     SurfaceRows rows;
-    for (int k = 0; k < count; ++k) rows.set(k, surfaces[first + static_cast<std::size_t>(k)]);
-    for (int s = 0; s < samples; s += kPoolSamples) light_samples(first, count, s, rows);
+    alignas(64) float vpl_gloss[kWalkBatch] = {};
+    for (int k = 0; k < count; ++k) {
+      const Surface& surface = surfaces[first + static_cast<std::size_t>(k)];
+      rows.set(k, surface);
+      vpl_gloss[k] = vpls_light_gloss(sampler.vpl_gloss, sampler.vpl_mirror_roughness, surface) ? 1.0f : 0.0f;
+    }
+    for (int s = 0; s < samples; s += kPoolSamples) light_samples(first, count, s, rows, vpl_gloss);
   }
 
  private:
   // Samples s, ..., s + kPoolSamples - 1.
-  LUMI_HD void light_samples(std::size_t first, int count, int s, const SurfaceRows& rows) const {
+  LUMI_HD void light_samples(std::size_t first, int count, int s, const SurfaceRows& rows,
+                             const float* vpl_gloss) const {
     const int many = glm::min(kPoolSamples, samples - s);
     PoolChoices choices;
     for (int t = 0; t < many; ++t)
@@ -152,8 +171,11 @@ struct PoolLightKernel {
     for (int t = 0; t < many; ++t) {
       const std::size_t at = static_cast<std::size_t>(s + t) * surfaces.size() + first;
       for (int k = 0; k < count; k += L)
-        write_lanes(light_by_pool<L>(rows, k, choices.light[t] + k, choices.weight[t] + k), glm::min(L, count - k),
-                    at + static_cast<std::size_t>(k));
+        write_lanes(light_by_pool<L>(rows, k, choices.light[t] + k, choices.weight[t] + k, vpl_gloss + k),
+                    glm::min(L, count - k), at + static_cast<std::size_t>(k));
+      if (!from_vpl.empty())
+        for (int k = 0; k < count; ++k)
+          from_vpl[at + static_cast<std::size_t>(k)] = choices.light[t][k]->vpl() ? 1 : 0;
     }
     const LightView& lights = sampler.lights;
     if (!lights.directional.empty() || lights.environment.present()) light_from_infinity(first, count, s, many, choices);
@@ -212,6 +234,7 @@ struct PoolLightKernel {
         const vec3 light = unoccluded_light(surfaces[i], sample) * choices.at_infinity[t][k];
         if (!(max_component(light) > 0) || !is_finite(light)) continue;
         contribution[at] = light;
+        if (!from_vpl.empty()) from_vpl[at] = 0;
         shadow[at] = shadow_ray(surfaces[i], sample, sampler.lights.diagonal);
       }
   }

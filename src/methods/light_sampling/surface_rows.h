@@ -61,15 +61,17 @@ LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> gloss_lanes(const SurfaceRows& surfaces, 
           multiply_add<L>(one - specular.z, miss5, specular.z) * seen};
 }
 
-// f of both lobes.
+// f of both lobes. `lit_gloss`: 1 where the gloss lobe is lit, else 0.
 template <int L>
 LUMI_HD LUMI_ALWAYS_INLINE LaneVec3<L> bsdf_lanes(const SurfaceRows& surfaces, int first, const LaneVec3<L>& n,
-                                                  const LaneVec3<L>& wi, const Lanes<L>& cos_surface) {
+                                                  const LaneVec3<L>& wi, const Lanes<L>& cos_surface,
+                                                  const Lanes<L>& lit_gloss = broadcast<L>(1)) {
   const LaneVec3<L> diffuse = load_rows<L>(surfaces.diffuse, first);
   const LaneVec3<L> f{diffuse.x * kInvPi, diffuse.y * kInvPi, diffuse.z * kInvPi};
   if (!surfaces.any_gloss) return f;
   const LaneVec3<L> gloss = gloss_lanes<L>(surfaces, first, n, wi, cos_surface);
-  return {f.x + gloss.x, f.y + gloss.y, f.z + gloss.z};
+  return {multiply_add<L>(gloss.x, lit_gloss, f.x), multiply_add<L>(gloss.y, lit_gloss, f.y),
+          multiply_add<L>(gloss.z, lit_gloss, f.z)};
 }
 
 // Shadow rays from the surfaces towards points `y`, as far as `end` of the way, that send `radiance` towards wo. None where

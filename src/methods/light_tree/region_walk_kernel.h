@@ -35,7 +35,7 @@ LUMI_HD LUMI_ALWAYS_INLINE Lanes<W> bound_children_of_region(const LightNode<W>&
   BoxLanes<W> boxes = load_boxes<W>(node);
   boxes.half = {boxes.half.x + region.half.x, boxes.half.y + region.half.y, boxes.half.z + region.half.z};
   return weigh_boxes<W>(
-             boxes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.inside2, broadcast<W>(region.centre),
+             boxes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.nearness, broadcast<W>(region.centre),
              broadcast<W>(region.normal), Weights::kMinMax, weighing.horizon_margin + region.spread)
       .near;
 }

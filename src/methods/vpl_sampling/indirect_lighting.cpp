@@ -51,6 +51,7 @@ void IndirectBuffers::add_counters(const IndirectBuffers& other) {
   rays += other.rays + other.light_tree.rays;
   select_ms += other.select_ms + other.light_tree.select_ms;
   trace_ms += other.trace_ms + other.light_tree.trace_ms;
+  light_tree.pool_ms += other.light_tree.pool_ms;
   light_tree.cut_ms += other.light_tree.cut_ms;
   light_tree.split_ms += other.light_tree.split_ms;
 }
