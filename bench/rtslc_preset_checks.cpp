@@ -1,4 +1,4 @@
-// The presets rtslc and tree of the program against each other: not in the paper of real-time stochastic lightcuts.
+// The presets rtslc and pool of the program against its preset tree: not in the paper of real-time stochastic lightcuts.
 #include <array>
 #include <cmath>
 
@@ -12,6 +12,8 @@ namespace {
 constexpr int kImages = 24;
 // The middle of the image: of whole camera samples.
 constexpr std::array<int, 4> kWindow = {320, 960, 180, 540};
+
+constexpr std::array<const char*, 2> kPresets = {"rtslc", "pool"};
 
 // What a preset says of direct light; of virtual point lights it is said too.
 Method preset_method(const std::string& name) {
@@ -28,27 +30,32 @@ Method preset_method(const std::string& name) {
 
 void report_equal_samples(const Subject& subject, const Report& report) {
   const int spp = make_preset("rtslc").direct.spp;
-  const std::vector<Measured> all = SubjectStudy::of(subject).measure(
-      {{preset_method("rtslc"), spp}, {preset_method("tree"), spp}}, kImages);
-  const Measured &rtslc = all[0], &tree = all[1];
-  const std::string what = fmt::format("equal time of sampling, {} spp each: RMSE rtslc / tree", spp);
-  for (const Measured* side : {&rtslc, &tree})
-    if (!side->ok()) {
-      report(missing_relation(0, subject.scene, what, "", side->missing));
-      return;
+  std::vector<Entry> entries = {{preset_method("tree"), spp}};
+  for (const char* preset : kPresets) entries.push_back({preset_method(preset), spp});
+  const std::vector<Measured> all = SubjectStudy::of(subject).measure(entries, kImages);
+  const Measured& tree = all[0];
+  for (std::size_t k = 1; k < all.size(); ++k) {
+    const Measured& ours = all[k];
+    const std::string& name = ours.entry.method.name;
+    const std::string what = fmt::format("equal time of sampling, {} spp each: RMSE {} / tree", spp, name);
+    const std::string& missing = ours.ok() ? tree.missing : ours.missing;
+    if (!missing.empty()) {
+      report(missing_relation(0, subject.scene, what, "", missing));
+      continue;
     }
-  const Estimate ratio = root(equal_time_ratio(rtslc, tree)), samples = root(mse_ratio(rtslc, tree));
-  report({0,
-          subject.scene,
-          what,
-          "",
-          ratio.value,
-          ratio.error,
-          {},
-          1,
-          fmt::format("rtslc: {}; tree: {}; RMSE at equal samples {:.3f} +- {:.3f}, time {:.3f}",
-                      measured_text(rtslc), measured_text(tree), samples.value, samples.error,
-                      rtslc.ms_median() / tree.ms_median())});
+    const Estimate ratio = root(equal_time_ratio(ours, tree)), samples = root(mse_ratio(ours, tree));
+    report({0,
+            subject.scene,
+            what,
+            "",
+            ratio.value,
+            ratio.error,
+            {},
+            1,
+            fmt::format("{}: {}; tree: {}; RMSE at equal samples {:.3f} +- {:.3f}, time {:.3f}", name,
+                        measured_text(ours), measured_text(tree), samples.value, samples.error,
+                        ours.ms_median() / tree.ms_median())});
+  }
 }
 
 // --- whole camera samples ----------------------------------------------------------------------------------------
@@ -118,21 +125,21 @@ Settings whole_settings(const Subject& subject, const std::string& preset) {
   return settings;
 }
 
-void report_presets(const Subject& subject, const Report& report) {
+void report_presets(const Subject& subject, const std::string& preset, const Report& report) {
   constexpr int kRounds = 6, kTreePairs = 4;
-  const std::string what = "equal time of whole camera samples: RMSE rtslc / tree";
-  if (const std::string missing = why_missing(subject, preset_method("rtslc"), 1); !missing.empty()) {
+  const std::string what = fmt::format("equal time of whole camera samples: RMSE {} / tree", preset);
+  if (const std::string missing = why_missing(subject, preset_method(preset), 1); !missing.empty()) {
     report(missing_relation(0, subject.scene, what, "", missing));
     return;
   }
   const Scene& scene = SubjectStudy::of(subject).scene();
-  Frames rtslc(scene, whole_settings(subject, "rtslc")), tree(scene, whole_settings(subject, "tree"));
+  Frames ours(scene, whole_settings(subject, preset)), tree(scene, whole_settings(subject, "tree"));
   for (int round = 0; round < kRounds; ++round) {
-    rtslc.pair();
+    ours.pair();
     for (int i = 0; i < kTreePairs; ++i) tree.pair();
   }
-  const Estimate a = rtslc.variance(), b = tree.variance();
-  const double square = a.value * rtslc.ms() / (b.value * tree.ms());
+  const Estimate a = ours.variance(), b = tree.variance();
+  const double square = a.value * ours.ms() / (b.value * tree.ms());
   const Estimate ratio = root({square, square * std::hypot(a.error / a.value, b.error / b.value)});
   report(
       {0,
@@ -144,8 +151,8 @@ void report_presets(const Subject& subject, const Report& report) {
        {},
        1,
        fmt::format(
-           "rtslc {:.0f} ms, variance {:.4g}; tree {:.0f} ms, variance {:.4g}; {}x{} pixels, jittered, {} light",
-           rtslc.ms(), a.value, tree.ms(), b.value, kWindow[1] - kWindow[0], kWindow[3] - kWindow[2],
+           "{} {:.0f} ms, variance {:.4g}; tree {:.0f} ms, variance {:.4g}; {}x{} pixels, jittered, {} light", preset,
+           ours.ms(), a.value, tree.ms(), b.value, kWindow[1] - kWindow[0], kWindow[3] - kWindow[2],
            subject.vpls ? "indirect" : "direct")});
 }
 
@@ -154,7 +161,7 @@ void report_presets(const Subject& subject, const Report& report) {
 void check_presets(const Report& report) {
   for (const Subject& subject : kSubjects) {
     report_equal_samples(subject, report);
-    report_presets(subject, report);
+    for (const char* preset : kPresets) report_presets(subject, preset, report);
   }
 }
 

@@ -538,7 +538,7 @@ TEST(FrameVplTree, SenselessCombinationsAreRefusedInOneSentence) {
   expect_says(refusal({{"indirect.correction", "0.5"}}, true), {"indirect.joint false"});
   expect_says(refusal({{"indirect.transport", "path"}}, true), {"indirect.transport is 'path'; use 'vpl'"});
   expect_says(refusal({{"direct.hierarchy", "two-level"}}, true), {"use 'perfect', 'saoh' or 'agglomerative'"});
-  expect_says(refusal({{"direct.selection", "pool"}}, true), {"indirect.joint does not combine with pools"});
+  expect_says(refusal({{"direct.selection", "pool"}, {"direct.hierarchy", "two-level"}}, true), {"direct.selection 'pool'", "set direct.hierarchy 'perfect'"});
 }
 
 }  // namespace

@@ -1,23 +1,23 @@
-// Method      Draws lights once for an area of pixels; every pixel takes some of them, in proportion to what each would
-//             send if nothing were in the way.
-// Paper       none of its own. J. Talbot, D. Cline, P. Egbert, "Importance Resampling for Global Illumination", EGSR 2005,
-//             for the choice among the drawn; B. Walter et al., "Lightcuts", SIGGRAPH 2005, whose clusters stand by one
-//             light for all pixels; A. Keller, W. Heidrich, "Interleaved Sampling", EGWR 2001; D. Lin, C. Yuksel,
-//             "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020), for the tree, and for blocks of pixels that
-//             share their look at it; P. Clarberg et al., "Wavelet Importance Sampling", SIGGRAPH 2005, for walks of
-//             ordered numbers that go down together.
-// Symbols     y_j, p_j -> LightPool -> point on a light, drawn for the area; probability of the light, over its area
-//             M -> PoolLookup::size -> lights of a pool; m -> interleave -> an area has m^2 / 2 pools, and its pixels
-//             take turns
-//             q_j(x) -> pool_weights -> Y of the irradiance at x from y_j, unoccluded, over p_j M
+// Method      Draws lights once for an area of pixels, below the nodes of one cut; every pixel takes some of them, in
+//             proportion to what each would send if nothing were in the way.
+// Paper       none of its own. D. Lin, C. Yuksel, "Real-Time Stochastic Lightcuts", Proc. ACM CGIT 3(1) (I3D 2020), for the
+//             tree, and for cuts that pixels share; B. Walter et al., "Lightcuts", SIGGRAPH 2005, whose clusters stand by
+//             one light for all pixels; J. Talbot, D. Cline, P. Egbert, "Importance Resampling for Global Illumination",
+//             EGSR 2005, for the choice among the drawn; A. Keller, W. Heidrich, "Interleaved Sampling", EGWR 2001.
+// Symbols     C -> AreaCut -> nodes that hold all lights once; M -> PoolLookup::size -> most of them
+//             y_j, p_j -> LightPool -> point on a light below node j of C; probability of the light there, over its area
+//             m -> interleave -> an area has m^2 / 2 pools, and its pixels take turns
+//             q_j(x) -> pool_weights -> Y of the irradiance at x from y_j, unoccluded, over p_j
 //             P_j(x) = q_j / sum q -> probability with which x takes y_j
-// Equations   L(x) = mean over what x takes of f(y_j) / (p_j M P_j)
-// Departures  The walks are those of the light tree, weighed for the whole area instead of a point: WalkRegion. All
-//             lights of an area come from strata of one set of walks, and the pools share them out in turn.
-// Estimator   unbiased: every light that can reach a point of the area is drawn with positive probability, and one that
-//             reaches x has q_j > 0. Pixels that share a pool err together; interleaving makes grain of that.
+// Equations   L(x) = mean over what x takes of f(y_j) / (p_j P_j)
+// Departures  Cuts and walks are for all points of the area: WalkRegion. Errors have the area's size as least distance, so
+//             that what is inside it does not take up the whole cut. The walks below a node are in strata.
+// Estimator   unbiased: the sum over the nodes of f(y_j) / p_j is, as every light that can reach a point of the area is
+//             drawn with positive probability, and one that reaches x has q_j > 0. Pixels that share a pool err together;
+//             interleaving makes grain of that.
 // In -> Out   surfaces of a tile -> LightPools; surfaces, pools -> shadow rays and contributions (pool_lighting_kernel.h)
-// Oracle      tests/light_pool_test.cpp: exhaustive sum, walks against those of single points, lanes against scalars.
+// Oracle      tests/light_pool_test.cpp: exhaustive sum, partition, walks against those of single points, lanes against
+//             scalars.
 #pragma once
 
 #include <span>
@@ -37,7 +37,7 @@ inline constexpr int kMaxDraws = kMaxPool * ((kMaxPoolInterleave * kMaxPoolInter
 struct alignas(64) PoolLight {
   vec3 position;
   vec3 axis;              // normal, or a spot light's axis; what leaves the light depends on the cosine c to it:
-  vec3 strength;          // radiance times area, or intensity, over p_j M
+  vec3 strength;          // radiance times area, or intensity, over p_j
   float offset, scale;    // share = offset + scale * max(c, -c * two_sided), from 0 to 1
   float two_sided;        // 1 or -1
   float squared;          // 1: the share is squared, 0: it is not
