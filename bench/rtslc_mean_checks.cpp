@@ -35,6 +35,9 @@ std::vector<Estimator> estimators() {
     all.push_back({with(perfect_cut(v, true), "two levels, cuts" + of, {}), 32});
     all.push_back({with(unbalanced_cut(v), "unbalanced tree, cuts" + of, {}), 32});
   }
+  all.push_back({with(perfect_root(Variant::kOurs, false), "pools",
+                      {{"selection", "pool"}, {"cut_share", "4"}, {"cut_interleave", "4"}}),
+                 8});
   all.push_back({unbalanced_root(), 32});
   all.push_back({ats(false), 32});
   all.push_back({ats(true), 4});
