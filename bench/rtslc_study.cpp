@@ -24,10 +24,10 @@ constexpr int kReferenceNumber = 1 << 20;  // beyond the numbers of the images t
 // Cuts of virtual point lights are looked up as those of emitters are.
 template <class Lighting>
 void set_window(Lighting& lighting, const PixelWindow& window) {
-  if constexpr (requires { lighting.lookup.window; })
-    lighting.lookup.window = window;
-  else if constexpr (requires { lighting.light_tree.lookup.window; })
-    lighting.light_tree.lookup.window = window;
+  if constexpr (requires { lighting.light_tree; })
+    lighting.light_tree.set_window(window);
+  else
+    lighting.set_window(window);
 }
 
 // What buffers have counted since they were made.
@@ -46,7 +46,7 @@ struct Counters {
 template <class Buffers>
 Counters counters_of(const Buffers& b) {
   Counters counters{0, b.select_ms + b.trace_ms, b.rays};
-  if constexpr (requires { b.cut_ms + b.split_ms; }) counters += {b.cut_ms, b.cut_ms + b.split_ms, 0};
+  if constexpr (requires { b.cut_ms; }) counters += {b.cut_ms, b.cut_ms + b.pool_ms + b.split_ms, 0};
   if constexpr (requires { b.light_tree.cut_ms; }) counters += counters_of(b.light_tree);
   return counters;
 }
@@ -195,7 +195,7 @@ double Measured::samples() const {
   const std::string split = value_of(entry.method, "split"),
                     interleave = value_of(entry.method, "cut_interleave");
   if (!split.empty() && split != "0") return rays;
-  const int m = interleave.empty() ? 1 : std::stoi(interleave);
+  const int m = interleave.empty() || !entry.uses_cuts() ? 1 : std::stoi(interleave);
   return static_cast<double>(entry.spp) / (m * m);
 }
 
@@ -225,8 +225,7 @@ SubjectStudy& SubjectStudy::of(const Subject& subject) {
 
 World& SubjectStudy::mutable_world(const Settings& settings) {
   const std::string group = subject_.vpls ? "indirect." : "direct.";
-  const bool tree =
-      get_value(settings, group + "selection") == "root" || get_value(settings, group + "selection") == "cut";
+  const bool tree = get_value(settings, group + "hierarchy") != "none";
   std::string key = tree ? "" : "no tree";
   for (const char* name : {"hierarchy", "width", "cones", "weights"})
     if (tree && is_setting(group + name)) key += get_value(settings, group + name) + ' ';

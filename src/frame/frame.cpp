@@ -122,8 +122,8 @@ void light_tile(const World& world, const Settings& settings, DirectLighting dir
     launch(count, EmissionKernel{scene, lights, settings.light_scale, b.rays, b.surfaces, b.emission});
   });
 
-  direct.lookup.window = direct.pools.areas.window = tile;
-  indirect.light_tree.lookup.window = indirect.light_tree.pools.areas.window = tile;
+  direct.set_window(tile);
+  indirect.light_tree.set_window(tile);
   b.direct_buffers.vpl_sum = settings.indirect.joint ? std::span<vec3>(b.indirect) : std::span<vec3>();
   add_direct_light(direct, b.surfaces, b.pixels, kDimLight, b.direct_buffers, b.direct);
   add_path_light(make_path_tracing(settings, direct, b.direct_buffers), b.surfaces, b.pixels, b.path_buffers,

@@ -4,6 +4,7 @@
 
 #include "base/stopwatch.h"
 #include "device/device.h"
+#include "lumigrove/error.h"
 #include "lights/unoccluded_kernel.h"
 #include "methods/light_sampling/direct_lighting_kernel.h"
 #include "methods/light_sampling/pool_lighting_kernel.h"
@@ -145,6 +146,8 @@ void add_pool_samples(const DirectLighting& lighting, std::span<const Surface> s
                       std::span<const std::uint32_t> pixels, std::uint32_t dimension, DirectBuffers& buffers,
                       std::span<vec3> sum) {
   const PixelWindow window = lighting.pools.areas.window;
+  if (static_cast<std::size_t>(window.count()) != surfaces.size())
+    throw Error("pools light whole windows of pixels, but the surfaces are others");
   const int edge = lighting.pools.areas.share;
   const bool together = edge % kPixelSuperblock == 0 && window.y0 % kPixelSuperblock == 0;
   std::size_t first = 0;

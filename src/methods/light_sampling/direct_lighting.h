@@ -35,6 +35,9 @@ struct DirectLighting {
   // Splitting, where `use_split`: `spp` samples below each part that the light BVH is split into.
   bool use_split = false;
   SplitOptions split;
+
+  // For cuts and pools: the pixels whose surfaces are lit.
+  void set_window(const PixelWindow& window) { lookup.window = pools.areas.window = window; }
 };
 
 // Working memory, reused from batch to batch. `rays` counts the shadow rays traced.
