@@ -56,20 +56,6 @@ bool is_setting(const std::string& key) {
   return std::any_of(table.begin(), table.end(), [&](const SettingInfo& info) { return info.key == key; });
 }
 
-double mean_variance(const std::vector<Mean>& values) {
-  double sum = 0;
-  for (const Mean& value : values) sum += value.estimate().error * value.estimate().error;
-  return sum / static_cast<double>(values.size());
-}
-
-void add_to(std::vector<Mean>& values, const RgbImage& image) {
-  values.resize(image.rgb.size());
-  launch(static_cast<int>(values.size()), [&](int index) {
-    const auto i = static_cast<std::size_t>(index);
-    values[i].add(static_cast<double>(image.rgb[i]));
-  });
-}
-
 RgbImage means_of(const std::vector<Mean>& values, RgbImage like) {
   for (std::size_t i = 0; i < values.size(); ++i) like.rgb[i] = static_cast<float>(values[i].mean());
   return like;

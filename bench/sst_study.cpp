@@ -26,18 +26,6 @@ void for_parts(std::size_t count, const Function& light_part) {
       1);
 }
 
-// Variance of the mean of several images, for one of their values.
-double mean_variance(const std::vector<Mean>& values) {
-  double sum = 0;
-  for (const Mean& value : values) sum += value.estimate().error * value.estimate().error;
-  return sum / static_cast<double>(values.size());
-}
-
-void add_to(std::vector<Mean>& values, const RgbImage& image) {
-  values.resize(image.rgb.size());
-  for (std::size_t i = 0; i < values.size(); ++i) values[i].add(static_cast<double>(image.rgb[i]));
-}
-
 }  // namespace
 
 Settings sst_settings(bool diffuse) {

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "device/device.h"
+
 namespace lumigrove::bench {
 namespace {
 
@@ -46,6 +48,20 @@ Estimate mean_difference(std::span<const double> a, std::span<const double> b) {
   Mean mean;
   for (std::size_t i = 0; i < a.size(); ++i) mean.add(a[i] - b[i]);
   return mean.estimate();
+}
+
+void add_to(std::vector<Mean>& values, const RgbImage& image) {
+  values.resize(image.rgb.size());
+  launch(static_cast<int>(values.size()), [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    values[i].add(static_cast<double>(image.rgb[i]));
+  });
+}
+
+double mean_variance(const std::vector<Mean>& values) {
+  double sum = 0;
+  for (const Mean& value : values) sum += value.estimate().error * value.estimate().error;
+  return sum / static_cast<double>(values.size());
 }
 
 // --- a scene -------------------------------------------------------------------------------------------------

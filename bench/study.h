@@ -50,6 +50,11 @@ Estimate mean_of(std::span<const double> values);
 // Mean of a - b, which were measured together.
 Estimate mean_difference(std::span<const double> a, std::span<const double> b);
 
+// Of the values of several images, one for one.
+void add_to(std::vector<Mean>& values, const RgbImage& image);
+// Variance of the mean of these images, for one of their values.
+double mean_variance(const std::vector<Mean>& values);
+
 // --- a scene -------------------------------------------------------------------------------------------------
 
 // A scene and its world, as `settings` ask for: its light tree and camera.

@@ -120,15 +120,23 @@ LUMI_HD inline float spot_profile(const Emitter& e, float cos_axis) {
   return ramp * ramp;
 }
 
-LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitter& e, vec3 x) {
+// The place of a light without area, as seen from x; distance 0 at the very same place.
+LUMI_HD inline EmitterPoint point_seen_from(vec3 position, vec3 x) {
   EmitterPoint p;
-  const PunctualView& light = lights.punctual[e.index()];
-  const vec3 to_light = e.p0 - x;
+  const vec3 to_light = position - x;
   const float d2 = length_squared(to_light);
   if (!(d2 > 0)) return p;
-  p.position = e.p0;
+  p.position = position;
   p.distance = glm::sqrt(d2);
   p.wi = to_light / p.distance;
+  return p;
+}
+
+LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitter& e, vec3 x) {
+  const PunctualView& light = lights.punctual[e.index()];
+  EmitterPoint p = point_seen_from(e.p0, x);
+  if (!(p.distance > 0)) return p;
+  const float d2 = length_squared(e.p0 - x);
   float attenuation = range_window(d2, light.range) / d2;
   if (light.spot) attenuation *= spot_profile(e, -glm::dot(p.wi, e.e1));
   p.incident = light.intensity * attenuation;
@@ -136,16 +144,10 @@ LUMI_HD inline EmitterPoint punctual_point(const LightView& lights, const Emitte
 }
 
 LUMI_HD inline EmitterPoint vpl_point(const LightView& lights, const Emitter& e, vec3 x) {
-  EmitterPoint p;
-  const vec3 to_light = e.p0 - x;
-  const float d2 = length_squared(to_light);
-  if (!(d2 > 0)) return p;
-  p.position = e.p0;
-  p.distance = glm::sqrt(d2);
-  p.wi = to_light / p.distance;
+  EmitterPoint p = point_seen_from(e.p0, x);
   const float cos_light = -glm::dot(p.wi, e.e1);
   if (!(cos_light > 0)) return p;
-  p.incident = e.e2 * glm::min(cos_light / d2, lights.vpl_clamp);
+  p.incident = e.e2 * glm::min(cos_light / length_squared(e.p0 - x), lights.vpl_clamp);
   p.clear = e.p0 + e.e1 * lights.vpls[e.index()].epsilon;
   return p;
 }
@@ -178,6 +180,15 @@ LUMI_HD inline bool is_cut_out(const SceneView& scene, const MeshPoint& point) {
   return is_cut_out(scene, mesh, point.triangle, point.u, point.v);
 }
 
+// Radiance that a triangle emits at a point of it.
+LUMI_HD LUMI_ALWAYS_INLINE vec3 radiance_at(const SceneView& scene, const EmissiveInstance& instance, const Emitter& e,
+                                            std::uint32_t index, float b1, float b2) {
+  if (!instance.textured && !instance.masked) return instance.radiance;
+  const MeshPoint point = mesh_point(scene, instance, e, index, b1, b2);
+  if (instance.masked && is_cut_out(scene, point)) return vec3(0);
+  return instance.textured ? instance.radiance * emissive_texture_at(scene, point) : instance.radiance;
+}
+
 LUMI_HD LUMI_ALWAYS_INLINE EmitterPoint triangle_point(const SceneView& scene, const LightView& lights, const Emitter& e,
                                            std::uint32_t index, vec3 x, vec2 u) {
   EmitterPoint p;
@@ -195,12 +206,7 @@ LUMI_HD LUMI_ALWAYS_INLINE EmitterPoint triangle_point(const SceneView& scene, c
   if (!(cos_light > 0)) return p;
   p.distance = d2 * inverse;
   p.wi = to_light * inverse;
-  p.incident = instance.radiance;
-  if (instance.textured || instance.masked) {
-    const MeshPoint point = mesh_point(scene, instance, e, index, b1, b2);
-    if (instance.textured) p.incident *= emissive_texture_at(scene, point);
-    if (instance.masked && is_cut_out(scene, point)) p.incident = vec3(0);
-  }
+  p.incident = radiance_at(scene, instance, e, index, b1, b2);
   p.area_to_solid = d2 / cos_light;
   return p;
 }

@@ -119,7 +119,7 @@ LUMI_HD inline AreaBounds bounds_of_area(const CutLookup& lookup, const PixelWin
 }
 
 LUMI_HD inline PoolLight punctual_pool_light(const LightView& lights, const Emitter& e, float weight) {
-  const PunctualView& light = lights.punctual[e.source & ~Emitter::kPunctual];
+  const PunctualView& light = lights.punctual[e.index()];
   PoolLight result{};
   result.position = e.p0;
   result.strength = light.intensity * weight;
@@ -144,15 +144,10 @@ LUMI_HD inline PoolLight triangle_pool_light(const SceneView& scene, const Light
   const float root = glm::sqrt(u.x), b1 = 1 - root, b2 = u.y * root;  // uniform by area
   result.position = e.p0 + e.e1 * b1 + e.e2 * b2;
   result.axis = n * (1 / area2);
-  result.strength = instance.radiance * (0.5f * area2 * weight);
+  result.strength = radiance_at(scene, instance, e, index, b1, b2) * (0.5f * area2 * weight);
   result.scale = 1;
   result.most = 3e38f;
   result.two_sided = instance.double_sided ? 1.0f : -1.0f;
-  if (instance.textured || instance.masked) {
-    const MeshPoint point = mesh_point(scene, instance, e, index, b1, b2);
-    if (instance.textured) result.strength *= emissive_texture_at(scene, point);
-    if (instance.masked && is_cut_out(scene, point)) result.strength = vec3(0);
-  }
   return result;
 }
 
@@ -190,22 +185,14 @@ struct CutOfRegion {
   const WalkRegion& region;
   float floor2;
 
-  LUMI_HD TreeStart enter(Subtree s) const {
-    if (s.children > 1 || is_leaf(tree, s)) return {s};
-    return {{s.node * W + s.first, static_cast<std::int16_t>(s.level + 1), 0, static_cast<std::uint8_t>(W)}};
-  }
   LUMI_HD bool root(TreeStart& start) const {
-    start = enter(binary_root(tree));
+    start = {enter_children<W>(tree, binary_root(tree))};
     return tree.count > 0;
   }
   LUMI_HD int split(const TreeStart& start, TreeStart (&parts)[2]) const {
-    const Subtree& s = start.subtree;
-    const auto half = static_cast<std::uint8_t>(s.children / 2);
-    int count = 0;
-    for (int side = 0; side < 2; ++side) {
-      const Subtree part{s.node, s.level, static_cast<std::uint8_t>(s.first + side * half), half};
-      if (bounds_of<W>(tree.level<W>(s.level)[s.node], part.first, half).intensity > 0) parts[count++] = enter(part);
-    }
+    Subtree halves[2];
+    const int count = halves_with_lights<W>(tree, start.subtree, halves);
+    for (int k = 0; k < count; ++k) parts[k] = {enter_children<W>(tree, halves[k])};
     return count;
   }
   LUMI_HD float error(const TreeStart& start) const {
@@ -263,8 +250,7 @@ struct PoolKernel {
     for (int k = 0; k < cut.count; ++k)
       starts[k] = {cut.nodes[k].subtree, static_cast<std::uint32_t>(k * many), static_cast<std::uint32_t>((k + 1) * many)};
 
-    const auto corner = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
-    const Rng numbers{rng.seed, rng.frame, corner};
+    const Rng numbers = rng_of_block(rng, pixels);
     float r[kMaxDraws], fresh[kMaxDraws];
     const float inverse_many = 1 / static_cast<float>(many);
     count = cut.count * many;

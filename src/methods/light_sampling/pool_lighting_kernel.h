@@ -167,7 +167,7 @@ struct PoolLightKernel {
         choices.weight[t][k] = choices.at_infinity[t][k] = 0;
       }
     for (int k = 0; k < count; ++k) choose(first + static_cast<std::size_t>(k), k, s, many, choices);
-    constexpr int L = kWalkBatch < 16 ? kWalkBatch : 16;
+    constexpr int L = kPoolLanes;
     for (int t = 0; t < many; ++t) {
       const std::size_t at = static_cast<std::size_t>(s + t) * surfaces.size() + first;
       for (int k = 0; k < count; k += L)

@@ -16,14 +16,20 @@ struct WalkRegion {
   float spread = 0;
 };
 
+template <int W>
+LUMI_HD LUMI_ALWAYS_INLINE BoxLanes<W> boxes_around_region(const LightNode<W>& node, const WalkRegion& region) {
+  BoxLanes<W> boxes = load_boxes<W>(node);
+  boxes.half = {boxes.half.x + region.half.x, boxes.half.y + region.half.y, boxes.half.z + region.half.z};
+  return boxes;
+}
+
 // Weights of children first, ..., first + children - 1 for a region: every one that is positive for a point of it is positive. No point is nearer to a box, nor the box
 // higher above its horizon, than the centre is to the box enlarged by the region, with a margin for the normals.
 template <int W>
 LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children_of_region(const LightNode<W>& node, int first, int children,
                                                                     Weighing weighing, const WalkRegion& region) {
-  BoxLanes<W> boxes = load_boxes<W>(node);
+  BoxLanes<W> boxes = boxes_around_region<W>(node, region);
   if (children < W) boxes.intensity = boxes.intensity * lanes_in_range<W>(first, children);
-  boxes.half = {boxes.half.x + region.half.x, boxes.half.y + region.half.y, boxes.half.z + region.half.z};
   weighing.horizon_margin += region.spread;
   return weigh_children<W>(boxes, node, weighing, region.centre, region.normal);
 }
@@ -32,11 +38,10 @@ LUMI_HD LUMI_ALWAYS_INLINE ChildWeights<W> weigh_children_of_region(const LightN
 template <int W>
 LUMI_HD LUMI_ALWAYS_INLINE Lanes<W> bound_children_of_region(const LightNode<W>& node, const Weighing& weighing,
                                                              const WalkRegion& region) {
-  BoxLanes<W> boxes = load_boxes<W>(node);
-  boxes.half = {boxes.half.x + region.half.x, boxes.half.y + region.half.y, boxes.half.z + region.half.z};
   return weigh_boxes<W>(
-             boxes, weighing.cones, [&] { return load_cones<W>(node); }, weighing.nearness, broadcast<W>(region.centre),
-             broadcast<W>(region.normal), Weights::kMinMax, weighing.horizon_margin + region.spread)
+             boxes_around_region<W>(node, region), weighing.cones, [&] { return load_cones<W>(node); },
+             weighing.nearness, broadcast<W>(region.centre), broadcast<W>(region.normal), Weights::kMinMax,
+             weighing.horizon_margin + region.spread)
       .near;
 }
 

@@ -174,6 +174,26 @@ LUMI_HD inline Subtree binary_root(const LightTreeView& tree) {
   return root;
 }
 
+// One child of a node is that child's own children, where it has any.
+template <int W>
+LUMI_HD inline Subtree enter_children(const LightTreeView& tree, Subtree s) {
+  if (s.children > 1 || is_leaf(tree, s)) return s;
+  return {s.node * W + s.first, static_cast<std::int16_t>(s.level + 1), 0, static_cast<std::uint8_t>(W)};
+}
+
+// The halves of several children that hold lights, and not only bogus ones.
+template <int W>
+LUMI_HD inline int halves_with_lights(const LightTreeView& tree, const Subtree& s, Subtree (&halves)[2]) {
+  const LightNode<W>& node = tree.level<W>(s.level)[s.node];
+  const auto half = static_cast<std::uint8_t>(s.children / 2);
+  int count = 0;
+  for (int side = 0; side < 2; ++side) {
+    const auto first = static_cast<std::uint8_t>(s.first + side * half);
+    if (bounds_of<W>(node, first, half).intensity > 0) halves[count++] = {s.node, s.level, first, half};
+  }
+  return count;
+}
+
 // The perfect tree, of one level or two.
 template <int W>
 struct CutOfTrees {
@@ -189,15 +209,11 @@ struct CutOfTrees {
     return tree_of(start).template level<W>(start.subtree.level)[start.subtree.node];
   }
 
-  // One child of a node is that child's own children, where it has any; a leaf of the top level is the tree of its
-  // mesh.
+  // A leaf of the top level is the tree of its mesh.
   LUMI_HD TreeStart enter(const TreeStart& start) const {
     const Subtree& s = start.subtree;
-    if (s.children > 1) return start;
     const LightTreeView& tree = tree_of(start);
-    if (!is_leaf(tree, s))
-      return {{s.node * W + s.first, static_cast<std::int16_t>(s.level + 1), 0, static_cast<std::uint8_t>(W)},
-              start.instance};
+    if (!is_leaf(tree, s)) return {enter_children<W>(tree, s), start.instance};
     if (start.instance != kNoId || !below.present()) return start;
     const std::uint32_t instance = tree.leaf_emitters[s.node * W + s.first];
     const std::uint32_t mesh = below.instances[instance].tree;
@@ -211,15 +227,9 @@ struct CutOfTrees {
   }
 
   LUMI_HD int split(const TreeStart& start, TreeStart (&parts)[2]) const {
-    const auto half = static_cast<std::uint8_t>(start.subtree.children / 2);
-    int count = 0;
-    for (int side = 0; side < 2; ++side) {
-      TreeStart part = start;
-      part.subtree.first = static_cast<std::uint8_t>(start.subtree.first + side * half);
-      part.subtree.children = half;
-      if (bounds_of<W>(node_of(part), part.subtree.first, half).intensity > 0)  // else nothing but bogus lights
-        parts[count++] = enter(part);
-    }
+    Subtree halves[2];
+    const int count = halves_with_lights<W>(tree_of(start), start.subtree, halves);
+    for (int k = 0; k < count; ++k) parts[k] = enter({halves[k], start.instance});
     return count;
   }
 
@@ -329,6 +339,11 @@ LUMI_HD inline CutEntries entries_of_pixel(const CutLookup& lookup, Pixel pixel,
   return {p * nodes / m2, (p + 1) * nodes / m2};
 }
 
+// Random numbers of a block, whatever tile it is clipped by: keyed by its first pixel.
+LUMI_HD inline Rng rng_of_block(const Rng& rng, const PixelWindow& pixels) {
+  return {rng.seed, rng.frame, static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0)};
+}
+
 // cuts[block]: of a random pixel of the block that shows a surface.
 struct CutKernel {
   LightSampler sampler;
@@ -342,8 +357,7 @@ struct CutKernel {
     LightCut& cut = cuts[static_cast<std::size_t>(block)];
     cut.count = 0;
     const PixelWindow pixels = lookup.pixels_of(block);
-    const auto number = static_cast<std::uint32_t>(pixels.y0) * 65536u + static_cast<std::uint32_t>(pixels.x0);
-    const float u = Rng{rng.seed, rng.frame, number}.uniform4(kDimCut).x;
+    const float u = rng_of_block(rng, pixels).uniform4(kDimCut).x;
     const int count = pixels.count(), random = static_cast<int>(u * static_cast<float>(count));
     for (int k = 0; k < count; ++k) {
       const int at = (random + k) % count;
