@@ -29,6 +29,7 @@ class Contestant {
   void begin(std::uint32_t seed);
   void sample();  // one more camera sample of the whole image
 
+  std::uint64_t emitters() const { return world_->lights.view().emitters.size(); }
   int spp() const { return spp_; }
   double seconds() const { return build_s_ + samples_s_; }
   double median_sample_s() const;

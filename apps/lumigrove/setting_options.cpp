@@ -142,7 +142,7 @@ CLI::Option* add_list_option(CLI::App& command, const std::string& name, int cou
       ->type_name(type_name);
 }
 
-std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command) {
+std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command, const std::string& threads) {
   auto options = std::make_shared<SettingOptions>();
   command.add_option("--preset,--method", options->preset, "Method, one of `list methods` (default tree)")
       ->check(not_empty())
@@ -161,7 +161,7 @@ std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command) {
   add_value(command, options, "--spp", "spp");
   add_size_options(command, options);
   add_value(command, options, "--seed", "seed");
-  add_value(command, options, "-t,--threads,--nthreads", "threads");
+  add_value(command, options, threads, "threads");
   add_value(command, options, "--max-bounces", "indirect.max_bounces")
       ->description("Most indirect bounces of a path or a virtual point light, 0 = direct light only (default of the method)");
   add_value(command, options, "--camera", "camera");

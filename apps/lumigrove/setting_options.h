@@ -21,7 +21,9 @@ struct SettingOptions {
   std::vector<std::string> pixel;        // x y; empty: not given
 };
 
-std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command);
+// `threads`: names of that option.
+std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command,
+                                                    const std::string& threads = "-t,--threads,--nthreads");
 
 // Preset, then settings files, then --set, then the options of their own; checked. Throws Error.
 Settings make_settings(const SettingOptions& options);
