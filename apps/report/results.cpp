@@ -30,6 +30,15 @@ Errors errors_of(const Json& json) {
   return errors;
 }
 
+// Declared before the template that calls them.
+Json to_json(const CurvePoint& point);
+Json to_json(const PassTime& pass);
+Json to_json(const StructureSize& structure);
+Json to_json(const Run& run);
+Json to_json(const Contender& contender);
+Json to_json(const Reference& reference);
+Json to_json(const FrameChange& change);
+
 template <class T>
 Json list_of(const std::vector<T>& items) {
   Json list = Json::array();
