@@ -16,10 +16,10 @@ Result frame_over_floor(const char* scene_name, const char* preset, const Option
   Film film(settings.width, settings.height);
 
   RayRecorder recorder;
-  world->tracer.record(&recorder);
+  world->geometry->tracer.record(&recorder);
   render_sample(*world, settings, 0, film, stats);
-  world->tracer.record(nullptr);
-  BareEmbree bare(scene, world->state);
+  world->geometry->tracer.record(nullptr);
+  BareEmbree bare(scene, world->geometry->state);
   bare.set_rays(recorder.closest, recorder.occluded);
   const int closest_mode = bare.best_closest_mode(3), occluded_mode = bare.best_occluded_mode(3);
 

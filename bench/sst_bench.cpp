@@ -17,7 +17,7 @@ namespace {
 class FloorPart {
  public:
   FloorPart(const Study& study, std::span<const Ray> closest, std::span<const Ray> occluded)
-      : bare_(study.scene, study.world->state) {
+      : bare_(study.scene, study.world->geometry->state) {
     bare_.set_rays(closest, occluded);
     closest_mode_ = bare_.best_closest_mode(3);
     occluded_mode_ = bare_.best_occluded_mode(3);
@@ -39,9 +39,9 @@ class FloorPart {
 template <class Function>
 RayRecorder record(Study& study, const Function& work) {
   RayRecorder recorder;
-  study.world->tracer.record(&recorder);
+  study.world->geometry->tracer.record(&recorder);
   work();
-  study.world->tracer.record(nullptr);
+  study.world->geometry->tracer.record(nullptr);
   return recorder;
 }
 

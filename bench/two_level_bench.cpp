@@ -19,7 +19,7 @@ Result build_two_level(const Options& options) {
   const Settings settings = two_level_settings();
   RenderStats stats;
   const std::unique_ptr<World> world = make_world(scene, settings, stats);
-  const SceneView view = world->arrays.view();
+  const SceneView view = world->geometry->arrays.view();
   const LightView lights = world->lights.view();
   const LightTree::Options tree{settings.direct.width, settings.direct.cones, false};
   const double first_ms = world->two_level.mesh_ms();

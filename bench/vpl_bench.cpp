@@ -14,17 +14,17 @@ Result trace_over_floor(const char* scene_name, const Options& options) {
   RenderStats stats;
   const std::unique_ptr<World> world = make_world(scene, settings, stats);
   VplTracing tracing;
-  tracing.scene = world->arrays.view();
+  tracing.scene = world->geometry->arrays.view();
   tracing.lights = world->lights.view();
-  tracing.bounds = world->state.bounds;
-  tracing.tracer = &world->tracer;
+  tracing.bounds = world->geometry->state.bounds;
+  tracing.tracer = &world->geometry->tracer;
 
   VplSet vpls;
   RayRecorder recorder;
-  world->tracer.record(&recorder);
+  world->geometry->tracer.record(&recorder);
   vpls.trace(tracing);
-  world->tracer.record(nullptr);
-  BareEmbree bare(scene, world->state);
+  world->geometry->tracer.record(nullptr);
+  BareEmbree bare(scene, world->geometry->state);
   bare.set_rays(recorder.closest, {});
   const int mode = bare.best_closest_mode(5);
 

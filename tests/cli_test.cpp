@@ -176,6 +176,9 @@ TEST_F(Cli, ListsNameEveryMethodAndSetting) {
     EXPECT_NE(methods.find(preset.name), std::string::npos);
     EXPECT_NE(methods.find(preset.citation), std::string::npos);
   }
+  EXPECT_NE(methods.find("    unbiased: direct light only\n"), std::string::npos) << methods;
+  for (const nlohmann::json& method : nlohmann::json::parse(run({"list", "methods", "--json"}).out))
+    EXPECT_NE(method["estimator"].get<std::string>().find("biased: "), std::string::npos) << method;
   for (const SettingInfo& info : settings_table()) EXPECT_NE(settings.find(info.key), std::string::npos);
   const nlohmann::json json = nlohmann::json::parse(run({"list", "settings", "--json"}).out);
   EXPECT_EQ(json.size(), settings_table().size());

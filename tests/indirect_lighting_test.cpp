@@ -88,8 +88,8 @@ class VplRoom {
   std::vector<Surface> surfaces_of(const std::vector<Ray>& rays) const {
     std::vector<Hit> hits(rays.size());
     std::vector<Surface> found(rays.size());
-    world_->tracer.closest(rays, hits, Coherence::kIncoherent);
-    launch(static_cast<int>(rays.size()), SurfaceKernel{world_->arrays.view(), rays, hits, found, false});
+    world_->geometry->tracer.closest(rays, hits, Coherence::kIncoherent);
+    launch(static_cast<int>(rays.size()), SurfaceKernel{world_->geometry->arrays.view(), rays, hits, found, false});
     return found;
   }
 

@@ -6,6 +6,7 @@
 
 #include "commands.h"
 #include "devices.h"
+#include "frame/estimator.h"
 #include "lumigrove/scene.h"
 #include "lumigrove/settings.h"
 
@@ -14,9 +15,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+std::string estimator_of(const PresetInfo& preset) {
+  return estimator_text(estimator_label(make_preset(preset.name)));
+}
+
 void print_methods() {
   for (const PresetInfo& preset : presets()) {
-    fmt::print("{}\n    {}\n    {}\n   ", preset.name, preset.description, preset.citation);
+    fmt::print("{}\n    {}\n    {}\n    {}\n   ", preset.name, preset.description, preset.citation,
+               estimator_of(preset));
     for (const auto& [key, value] : preset.values) fmt::print(" {}={}", key, value);
     fmt::print("\n");
   }
@@ -30,6 +36,7 @@ Json methods_json() {
     list.push_back({{"name", preset.name},
                     {"description", preset.description},
                     {"citation", preset.citation},
+                    {"estimator", estimator_of(preset)},
                     {"settings", values}});
   }
   return list;

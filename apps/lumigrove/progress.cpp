@@ -57,12 +57,42 @@ void add_progress_option(CLI::App& command, std::string& name) {
       ->check(CLI::IsMember({"auto", "bar", "plain", "json", "none"}));
 }
 
-ProgressPrinter::ProgressPrinter(ProgressStyle style, int frame_count)
-    : style_(style), frame_count_(frame_count) {}
+double ProgressLine::elapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
-ProgressPrinter::~ProgressPrinter() { end_line(); }
+bool ProgressLine::due(bool last) const {
+  if (style_ == ProgressStyle::kSilent) return false;
+  if (last) return true;
+  if (last_shown_ < 0 && style_ != ProgressStyle::kPlain) return true;
+  return elapsed() - std::max(last_shown_, 0.0) >= interval_of(style_);
+}
 
-void ProgressPrinter::end_line() {
+void ProgressLine::show(double done, const std::string& text, nlohmann::json fields) {
+  const double seconds = elapsed();
+  last_shown_ = seconds;
+  if (style_ == ProgressStyle::kBar) {
+    draw_bar(done, text);
+  } else if (style_ == ProgressStyle::kJson) {
+    fields["done"] = done;
+    fields["elapsed_s"] = seconds;
+    fields["left_s"] = remaining(done, seconds);
+    fmt::print(stderr, "{}\n", fields.dump());
+  } else if (style_ == ProgressStyle::kPlain) {
+    fmt::print(stderr, "{:3.0f}%  {}, {} elapsed{}\n", 100 * done, text, clock_text(seconds), left_text(done, seconds));
+  }
+}
+
+void ProgressLine::draw_bar(double done, const std::string& text) {
+  const int filled = static_cast<int>(done * kBarWidth);
+  std::string line = fmt::format("[{}{}] {:3.0f}%  {}{}", std::string(filled, '#'), std::string(kBarWidth - filled, '-'),
+                                 100 * done, text, left_text(done, elapsed()));
+  const std::size_t length = line.size();
+  if (length < bar_length_) line.append(bar_length_ - length, ' ');  // over the rest of a longer line
+  bar_length_ = length;
+  fmt::print(stderr, "\r{}", line);
+  std::fflush(stderr);
+}
+
+void ProgressLine::end() {
   if (bar_length_ > 0) std::fputs("\n", stderr);
   bar_length_ = 0;
 }
@@ -73,51 +103,19 @@ void ProgressPrinter::begin_frame(int frame) {
 }
 
 void ProgressPrinter::update(const Progress& progress) {
-  if (style_ == ProgressStyle::kSilent) return;
-  const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
+  const bool last = progress.spp_done >= progress.spp_total && frames_begun_ == frame_count_;
+  if (!line_.due(last)) return;
   const double in_frame =
       progress.spp_total > 0 ? static_cast<double>(progress.spp_done) / progress.spp_total : 1;
-  const double done = (frames_begun_ - 1 + in_frame) / frame_count_;
-  const bool last = progress.spp_done >= progress.spp_total && frames_begun_ == frame_count_;
-  const double since = last_shown_ < 0 && style_ == ProgressStyle::kPlain ? elapsed : elapsed - last_shown_;
-  const bool due = since >= interval_of(style_) || (last_shown_ < 0 && style_ != ProgressStyle::kPlain);
-  if (!due && !last) return;
-  last_shown_ = elapsed;
-
   std::string counts = fmt::format("{}/{} spp", progress.spp_done, progress.spp_total);
   if (frame_count_ > 1)
     counts = fmt::format("frame {} ({}/{}), {}", frame_, frames_begun_, frame_count_, counts);
-  if (style_ == ProgressStyle::kBar)
-    draw_bar(done, elapsed, counts);
-  else if (style_ == ProgressStyle::kJson)
-    print_json(progress, done, elapsed);
-  else
-    fmt::print(stderr, "{:3.0f}%  {}, {} elapsed{}\n", 100 * done, counts, clock_text(elapsed),
-               left_text(done, elapsed));
-}
-
-void ProgressPrinter::draw_bar(double done, double elapsed, const std::string& counts) {
-  const int filled = static_cast<int>(done * kBarWidth);
-  std::string line =
-      fmt::format("[{}{}] {:3.0f}%  {}{}", std::string(filled, '#'), std::string(kBarWidth - filled, '-'),
-                  100 * done, counts, left_text(done, elapsed));
-  const std::size_t length = line.size();
-  if (length < bar_length_) line.append(bar_length_ - length, ' ');  // over the rest of a longer line
-  bar_length_ = length;
-  fmt::print(stderr, "\r{}", line);
-  std::fflush(stderr);
-}
-
-void ProgressPrinter::print_json(const Progress& progress, double done, double elapsed) const {
-  const nlohmann::json line = {{"frame", frame_},
-                               {"frames_done", frames_begun_ - 1},
-                               {"frames_total", frame_count_},
-                               {"spp_done", progress.spp_done},
-                               {"spp_total", progress.spp_total},
-                               {"done", done},
-                               {"elapsed_s", elapsed},
-                               {"left_s", remaining(done, elapsed)}};
-  fmt::print(stderr, "{}\n", line.dump());
+  line_.show((frames_begun_ - 1 + in_frame) / frame_count_, counts,
+             {{"frame", frame_},
+              {"frames_done", frames_begun_ - 1},
+              {"frames_total", frame_count_},
+              {"spp_done", progress.spp_done},
+              {"spp_total", progress.spp_total}});
 }
 
 }  // namespace lumigrove

@@ -86,7 +86,7 @@ struct Reference {
   int frame = 0;
   std::string file;    // EXR of one beauty layer, relative to the folder; what "light" says
   std::string origin;  // "path, 1024 spp in two halves, 61 s", or the file that was given
-  Errors errors = kNoErrors;  // its own, estimated; NaN: unknown. SSIM: that of its halves
+  Errors errors = kNoErrors;  // its own, estimated; NaN: unknown. SSIM: how far below 1
 };
 
 // Between two neighbouring frames of one run, on tone-mapped sRGB in [0,1]; a the method, r the reference.

@@ -108,6 +108,7 @@ struct Settings {
 struct PresetInfo {
   std::string name, description, citation;
   std::vector<std::pair<std::string, std::string>> values;  // key, value applied over the defaults
+  bool reference = false;  // the one that all others are measured against; one row is
 };
 struct SettingInfo {
   std::string key, type, default_value, unit, description;

@@ -108,7 +108,7 @@ std::vector<std::uint8_t> find_occluded(const World& world, std::span<const Walk
   for (std::size_t i = 0; i < rays.size(); ++i)
     if (length_squared(light[i]) > 0) rays[i] = vpl_shadow_ray(*starts[i].surface, drawn[i].light);
   std::vector<std::uint8_t> occluded(rays.size());
-  world.tracer.occluded(rays, occluded, Coherence::kIncoherent);
+  world.geometry->tracer.occluded(rays, occluded, Coherence::kIncoherent);
   return occluded;
 }
 
@@ -125,8 +125,8 @@ void count_inside(const World& world, const IndirectLighting& lighting, std::spa
     rays.push_back(ray);
   }
   std::vector<Hit> hits(rays.size());
-  world.tracer.closest(rays, hits, Coherence::kIncoherent);
-  const SceneView scene = world.arrays.view();
+  world.geometry->tracer.closest(rays, hits, Coherence::kIncoherent);
+  const SceneView scene = world.geometry->arrays.view();
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (hits[i].instance == kNoId) continue;
     const auto& instance = scene.instances[hits[i].instance];
@@ -259,8 +259,8 @@ SeenSurfaces see_surfaces(const World& world, const Settings& settings, const Pi
   std::vector<Hit> hits(n);
   SeenSurfaces seen{std::vector<Surface>(n), std::vector<std::uint32_t>(n)};
   launch(window.count(), CameraKernel{camera, window, rays, seen.pixels, rng.seed, rng.frame, jitter});
-  world.tracer.closest(rays, hits, Coherence::kCoherent);
-  launch(window.count(), SurfaceKernel{world.arrays.view(), rays, hits, seen.surfaces, settings.force_diffuse});
+  world.geometry->tracer.closest(rays, hits, Coherence::kCoherent);
+  launch(window.count(), SurfaceKernel{world.geometry->arrays.view(), rays, hits, seen.surfaces, settings.force_diffuse});
   return seen;
 }
 
@@ -320,7 +320,7 @@ TrueLight true_light(const World& world, const IndirectLighting& lighting, const
   std::vector<std::uint8_t> occluded;
   if (tree.count <= kMostTrueShadowRays) {
     occluded.resize(tree.count);
-    world.tracer.occluded(rays, occluded, Coherence::kIncoherent);
+    world.geometry->tracer.occluded(rays, occluded, Coherence::kIncoherent);
   }
   TrueLight truth;
   truth.unoccluded.assign(1, 0);

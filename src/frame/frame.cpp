@@ -100,7 +100,7 @@ void light_tile(const World& world, const Settings& settings, DirectLighting dir
                 const CameraView& camera, const PixelWindow& tile, int sample, TileBuffers& b, Film& film) {
   const int count = tile.count();
   const std::size_t n = static_cast<std::size_t>(count);
-  const SceneView scene = world.arrays.view();
+  const SceneView scene = world.geometry->arrays.view();
   const LightView lights = world.lights.view();
 
   timed(b.camera_ms, [&] {
@@ -113,7 +113,7 @@ void light_tile(const World& world, const Settings& settings, DirectLighting dir
   });
   timed(b.primary_ms, [&] {
     b.hits.resize(n);
-    world.tracer.closest(b.rays, b.hits, Coherence::kCoherent);
+    world.geometry->tracer.closest(b.rays, b.hits, Coherence::kCoherent);
     b.primary_rays += n;
   });
   timed(b.surface_ms, [&] {
@@ -223,7 +223,7 @@ StructureStats build_light_tree(const LightView& lights, const SelectionSettings
 void build_two_level_tree(World& world, const DirectSettings& settings, RenderStats& stats) {
   TwoLevelTree& tree = world.two_level;
   const int meshes = tree.meshes_built();
-  tree.build(world.arrays.view(), world.lights.view(),
+  tree.build(world.geometry->arrays.view(), world.lights.view(),
              {settings.width, settings.cones, settings.mis, settings.weights});
   if (tree.meshes_built() > meshes)
     stats.structures.push_back({"bottom trees", tree.mesh_ms(), tree.mesh_bytes(), tree.mesh_triangles()});
@@ -304,13 +304,13 @@ void set_selection(const SelectionSettings& settings, const Settings& frame, int
 // The sampler that settings.indirect asks for over the virtual point lights as emitters.
 DirectLighting make_vpl_light_tree_lighting(const World& world, const Settings& settings, int sample) {
   DirectLighting lighting;
-  lighting.sampler.scene = world.arrays.view();
+  lighting.sampler.scene = world.geometry->arrays.view();
   lighting.sampler.lights = world.vpl_lights.view();
   lighting.sampler.tree = world.vpl_tree.view();
   lighting.sampler.bvh = world.vpl_bvh.view();
   lighting.sampler.vpl_gloss = settings.indirect.gloss;
   lighting.sampler.vpl_mirror_roughness = settings.indirect.mirror_roughness;
-  lighting.tracer = &world.tracer;
+  lighting.tracer = &world.geometry->tracer;
   set_selection(settings.indirect, settings, sample, lighting);
   return lighting;
 }
@@ -319,22 +319,29 @@ DirectLighting make_vpl_light_tree_lighting(const World& world, const Settings& 
 
 // --- the world ---------------------------------------------------------------------------------------------
 
-std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats,
-                                  History::Kept* kept) {
-  History::Kept known;
-  if (kept) known = take_kept(*kept, scene, settings);
+std::shared_ptr<Geometry> make_geometry(const Scene& scene, const Settings& settings, RenderStats& stats) {
   SceneState state = evaluate(scene, settings.time);
   SceneArrays arrays(scene);
   arrays.set_state(state);
   const Stopwatch watch;
   Tracer tracer(scene, state);
-  stats.structures.push_back(
-      {kAccelerationStructure, watch.ms(), tracer.bytes(), state.instances.size()});
-  LightSet lights = known.lights ? std::move(*known.lights) : LightSet(scene, arrays);
-  CameraInstance camera = resolve_camera(scene, state, settings);
-  auto world = std::make_unique<World>(World{
-      std::move(state), std::move(arrays), std::move(tracer), std::move(lights), {}, std::move(known.two_level), {}, {},
-      std::move(camera), known.texture_key, known.shape_key, {}, {}, {}, {}, {}, {}});
+  stats.structures.push_back({kAccelerationStructure, watch.ms(), tracer.bytes(), state.instances.size()});
+  return std::make_shared<Geometry>(Geometry{std::move(state), std::move(arrays), std::move(tracer)});
+}
+
+std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats,
+                                  History::Kept* kept) {
+  return make_world(scene, make_geometry(scene, settings, stats), settings, stats, kept);
+}
+
+std::unique_ptr<World> make_world(const Scene& scene, std::shared_ptr<Geometry> geometry, const Settings& settings,
+                                  RenderStats& stats, History::Kept* kept) {
+  History::Kept known;
+  if (kept) known = take_kept(*kept, scene, settings);
+  LightSet lights = known.lights ? std::move(*known.lights) : LightSet(scene, geometry->arrays);
+  CameraInstance camera = resolve_camera(scene, geometry->state, settings);
+  auto world = std::make_unique<World>(World{std::move(geometry), std::move(lights), {}, std::move(known.two_level), {}, {},
+                                             std::move(camera), known.texture_key, known.shape_key, {}, {}, {}, {}, {}, {}});
   build_lights(*world, settings, stats);
   return world;
 }
@@ -347,7 +354,7 @@ void keep(World&& world, History::Kept& kept) {
 }
 
 void build_lights(World& world, const Settings& settings, RenderStats& stats) {
-  world.lights.gather(world.arrays, world.state, settings);
+  world.lights.gather(world.geometry->arrays, world.geometry->state, settings);
   const LightView lights = world.lights.view();
   stats.emitters = lights.emitters.size();
   stats.structures.push_back(
@@ -412,10 +419,10 @@ void trace_vpls(World& world, const Settings& settings, int sample, RenderStats&
   const IndirectSettings& indirect = settings.indirect;
   if (indirect.transport != Transport::kVpl || (indirect.keep_vpls && sample > 0)) return;
   VplTracing tracing;
-  tracing.scene = world.arrays.view();
+  tracing.scene = world.geometry->arrays.view();
   tracing.lights = world.lights.view();
-  tracing.bounds = world.state.bounds;
-  tracing.tracer = &world.tracer;
+  tracing.bounds = world.geometry->state.bounds;
+  tracing.tracer = &world.geometry->tracer;
   tracing.rng = frame_rng(settings, sample);
   tracing.paths = std::max(1, indirect.vpls / indirect.bounces);
   tracing.bounces = indirect.bounces;
@@ -457,7 +464,7 @@ IndirectLighting make_indirect_lighting(const World& world, const Settings& sett
   indirect.all = s.selection == Selection::kAll;
   indirect.use_light_tree = uses_vpl_light_tree(s);
   if (indirect.use_light_tree) indirect.light_tree = make_vpl_light_tree_lighting(world, settings, sample);
-  indirect.tracer = &world.tracer;
+  indirect.tracer = &world.geometry->tracer;
   indirect.rng = frame_rng(settings, sample);
   indirect.spp = s.spp;
   return indirect;
@@ -466,7 +473,7 @@ IndirectLighting make_indirect_lighting(const World& world, const Settings& sett
 DirectLighting make_direct_lighting(const World& world, const Settings& settings, int sample) {
   DirectLighting direct;
   LightSampler& sampler = direct.sampler;
-  sampler.scene = world.arrays.view();
+  sampler.scene = world.geometry->arrays.view();
   sampler.lights = settings.indirect.joint ? world.vpl_lights.view() : world.lights.view();
   sampler.vpl_gloss = settings.indirect.gloss;
   sampler.vpl_mirror_roughness = settings.indirect.mirror_roughness;
@@ -475,7 +482,7 @@ DirectLighting make_direct_lighting(const World& world, const Settings& settings
   sampler.tree = two_level ? world.two_level.top().view() : world.tree.view();
   if (two_level) sampler.mesh_trees = world.two_level.view();
   sampler.bvh = world.bvh.view();
-  direct.tracer = &world.tracer;
+  direct.tracer = &world.geometry->tracer;
   direct.mis = settings.direct.mis;
   set_selection(settings.direct, settings, sample, direct);
   return direct;

@@ -23,12 +23,17 @@
 
 namespace lumigrove {
 
-// Everything that one moment of a scene needs before the first ray: made anew for every frame of an
-// animation, but for what a History keeps.
-struct World {
+// What one moment of a scene looks like to rays, however it is lit.
+struct Geometry {
   SceneState state;
   SceneArrays arrays;
   Tracer tracer;
+};
+
+// Everything that one moment of a scene needs before the first ray: made anew for every frame of an
+// animation, but for what a History keeps.
+struct World {
+  std::shared_ptr<Geometry> geometry;  // worlds of several methods may share it
   LightSet lights;
   // Over the emitters, or with indirect.joint over these and the virtual point lights:
   LightTree tree;          // built when direct.hierarchy is perfect and direct.selection is root or cut
@@ -52,6 +57,10 @@ struct World {
 // place to stand. With `kept`, structures are taken from there where they fit.
 std::unique_ptr<World> make_world(const Scene& scene, const Settings& settings, RenderStats& stats,
                                   History::Kept* kept = nullptr);
+// Its two parts: geometry at settings.time, for which `scene` must live on, and what the method builds over it.
+std::shared_ptr<Geometry> make_geometry(const Scene& scene, const Settings& settings, RenderStats& stats);
+std::unique_ptr<World> make_world(const Scene& scene, std::shared_ptr<Geometry> geometry, const Settings& settings,
+                                  RenderStats& stats, History::Kept* kept = nullptr);
 // Gives back to `kept` what later frames can use.
 void keep(World&& world, History::Kept& kept);
 

@@ -621,7 +621,8 @@ const std::vector<PresetInfo>& presets() {
         {"direct.hierarchy", "perfect"},
         {"direct.mis", "true"},
         {"indirect.transport", "path"},
-        {"indirect.max_bounces", "8"}}},
+        {"indirect.max_bounces", "8"}},
+       true},
       {"sst",
        "Stochastic substitute trees: VPLs traced for every sample, walks that stop at Gaussians standing for many VPLs; "
        "direct light by the light tree",

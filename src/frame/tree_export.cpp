@@ -163,7 +163,7 @@ std::string tree_json(const World& world) {
 
 Scene tree_scene(const World& world, std::size_t most_boxes, TreeSceneParts& parts) {
   const SubstituteTreeView tree = world.substitutes.view();
-  const float d = world.state.diagonal;
+  const float d = world.geometry->state.diagonal;
   std::vector<ShownBox> boxes = substitute_boxes(tree);
   parts = {std::min(boxes.size(), most_boxes), boxes.size(), tree.count};
   std::stable_sort(boxes.begin(), boxes.end(),
