@@ -204,13 +204,13 @@ void add_method_options(CLI::App& command, const std::shared_ptr<CompareOptions>
     return command.add_option(name, value, description)->type_name(type)->check(not_empty())->group(kMethods);
   };
   list("--methods", options->methods, "A,B,...",
-       "Methods of `list methods` to compare on the scene; tree:direct.spp=4 is one with another setting");
+       "Methods of `list methods` to compare on the scene; tree:direct.spp=4 is one with another setting, four=tree:direct.spp=4 calls it so");
   list("--budget", options->budget, "10s|64spp",
        "Time and number of samples that every method has with every seed; of one alone the other follows");
   text("--seeds", options->seeds, "N", "Runs of every method, for 95 % intervals (default 4)");
   text("--reference-method", options->reference_method, "NAME", "What renders the reference (default path)");
   list("--reference-budget", options->reference_budget, "60s|512spp",
-       "Of the reference (default 8 times the budget's time)");
+       "Of the reference (default: as long as all methods together)");
   auto* frames = text("--frames", options->frames, "A-BxS", "Frames of a sequence to compare, each with its reference");
   text("--fps", options->fps, "N", "Frames a second of --frames (default 24)")->needs(frames);
   text("--time", options->time, "SECONDS", "Moment of the animation (s, default 0)")->excludes(frames);

@@ -13,6 +13,7 @@
 #include "comparison_setup.h"
 #include "contestant.h"
 #include "frame_changes.h"
+#include "output.h"
 #include "page.h"
 #include "reference_image.h"
 #include "render_job.h"
@@ -50,7 +51,7 @@ class Contest {
 
   Results run() {
     start();
-    fs::create_directories(job_.folder / "images");
+    make_folder((job_.folder / "images").string());
     for (const int frame : results_.frames) {
       if (!frame_is_complete(frame)) compare_frame(frame);
       if (guard_.interrupted()) break;
@@ -142,7 +143,8 @@ class Contest {
         entries_.push_back({method, std::move(contestant), sample_s, {}, false});
       });
     }
-    if (entries_.empty()) throw Error(fmt::format("no method is left to compare: {}", results_.methods.front().failure));
+    if (entries_.empty() && !guard_.interrupted())
+      throw Error(fmt::format("no method is left to compare: {}", results_.methods.front().failure));
   }
 
   // The budget that was not asked for, from one sample of each method.
@@ -195,7 +197,8 @@ class Contest {
 
   BudgetSpec reference_budget() const {
     BudgetSpec budget = job_.reference_budget;
-    if (!(budget.seconds > 0) && budget.spp < 1) budget.seconds = kReferenceShare * results_.budget_s;
+    if (!(budget.seconds > 0) && budget.spp < 1)
+      budget.seconds = results_.budget_s * results_.seeds * static_cast<double>(entries_.size());
     return budget;
   }
 

@@ -35,7 +35,7 @@ struct ComparisonJob {
   BudgetSpec budget;
   int seeds = 4;
   ComparedMethod reference_method;
-  BudgetSpec reference_budget;  // neither: kReferenceShare times the time budget
+  BudgetSpec reference_budget;  // neither: as long as all methods together
   std::string reference_file;   // instead of the method; empty: none
   std::string layer;            // measured instead of what each method finds; empty: none
   std::vector<int> frames;      // empty: one picture at settings.time
@@ -48,8 +48,6 @@ struct ComparisonJob {
   std::string command;  // for the receipt
   ProgressStyle progress = ProgressStyle::kSilent;
 };
-
-inline constexpr double kReferenceShare = 8;
 
 // Writes EXRs, results.json and report.html into the folder and returns what the file holds. An interrupt ends it early
 // with what was measured until then (Results::complete is false). Throws Error when there is nothing to measure or the

@@ -15,6 +15,7 @@
 #include "commands.h"
 #include "image/difference.h"
 #include "metrics/metrics.h"
+#include "output.h"
 
 namespace lumigrove {
 namespace {
@@ -98,13 +99,6 @@ std::vector<std::string> broken_limits(const ComparedImage& image, const std::ve
 
 // --- pictures
 // -----------------------------------------------------------------------------------------------------
-
-void make_folder(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!fs::is_directory(folder))
-    throw Error(fmt::format("{}: cannot be made a folder: {}", folder, error.message()));
-}
 
 // File names without folder and extension; repeated ones get a number.
 std::vector<std::string> unique_stems(const std::vector<std::string>& files) {
