@@ -12,6 +12,7 @@
 #include "bench.h"
 #include "lumigrove/error.h"
 #include "lumigrove/renderer.h"
+#include "page.h"
 #include "reproduce.h"
 
 namespace lumigrove::bench {
@@ -73,7 +74,7 @@ struct Command {
   std::vector<std::string> names;
   std::string reproduction;
   std::vector<int> checks;
-  std::string json_file;
+  std::string json_file, html_file;
   int threads = 0;
   bool check = false;
 };
@@ -110,22 +111,30 @@ int reproduce(const Command& command) {
   const Reproduction& reproduction = find_reproduction(command.reproduction);
   const std::vector<int>& wanted = command.checks;
   Relations relations;
-  fmt::print("{}\n{}", reproduction.description, relation_header());
+  Table table = relation_table(reproduction.description);
+  const std::vector<int> widths = text_widths(table);
+  fmt::print("{}\n{}", reproduction.description, heading_text(table, widths));
   for (const Check& check : reproduction.checks) {
     if (!wanted.empty() && std::find(wanted.begin(), wanted.end(), check.number) == wanted.end()) continue;
     fmt::print(stderr, "check {}: {}\n", check.number, check.description);
     const Stopwatch watch;
     check.run([&](Relation relation) {
-      fmt::print("{}", relation_text(relation));
+      table.rows.push_back(relation_row(relation));
+      fmt::print("{}", row_text(table, table.rows.back(), widths));
       std::fflush(stdout);
       relations.push_back(std::move(relation));
     });
     fmt::print(stderr, "check {}: {:.0f} s\n", check.number, watch.ms() * 1e-3);
   }
   const int failed = count_verdicts(relations, Verdict::kFails);
-  fmt::print("{} hold, {} within {} standard errors, {} do not hold, {} reported only\n",
-             count_verdicts(relations, Verdict::kHolds), count_verdicts(relations, Verdict::kWithinError), kSigmas,
-             failed, count_verdicts(relations, Verdict::kReported));
+  const std::string sums =
+      fmt::format("{} hold, {} within {} standard errors, {} do not hold, {} reported only",
+                  count_verdicts(relations, Verdict::kHolds), count_verdicts(relations, Verdict::kWithinError), kSigmas,
+                  failed, count_verdicts(relations, Verdict::kReported));
+  fmt::print("{}\n", sums);
+  if (!command.html_file.empty())
+    write_table_page(command.html_file, fmt::format("Reproduction: {}", reproduction.name),
+                     fmt::format("{}. Lumigrove {} ({}).", sums, version(), commit()), table);
   if (!command.json_file.empty()) {
     nlohmann::ordered_json results = nlohmann::ordered_json::array();
     for (const Relation& relation : relations) results.push_back(to_json(relation));
@@ -147,6 +156,7 @@ int run(int argc, char** argv) {
   CLI::App* again = app.add_subcommand("reproduce", "Look for the relations that a paper reports");
   again->add_option("paper", command.reproduction, "sst or rtslc")->required();
   again->add_option("--only", command.checks, "numbers of the groups of relations to look for, all when none is given");
+  again->add_option("--html", command.html_file, "also write the table as a page that needs nothing else");
   again->fallthrough();
   CLI11_PARSE(app, argc, argv);
 

@@ -5,12 +5,15 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "table.h"
 
 namespace lumigrove::bench {
 
@@ -61,16 +64,33 @@ inline std::string ours_text(const Relation& r) {
   return r.error > 0 ? fmt::format("{:.4g} +- {:.1g}", r.ours, r.error) : fmt::format("{:.4g}", r.ours);
 }
 
-// A line a relation, and its note under it.
-inline std::string relation_header() {
-  return fmt::format("{:<2} {:<14} {:<72} {:>14} {:>18} {:>14}  {}\n", "", "scene", "relation", "published", "ours",
-                     "wanted", "");
+// An empty table of relations. Its widths are fixed, so that rows can be printed as they are found.
+inline Table relation_table(const std::string& caption = {}) {
+  Table table;
+  table.key = "relations";
+  table.caption = caption;
+  table.columns = {{"check", "", "group of relations", false, true, 2},
+                   {"scene", "scene", "empty: made for the purpose", false, true, 14},
+                   {"relation", "relation", "the quantity, and the numbers behind it", false, true, 72},
+                   {"published", "published", "in the paper's words or numbers", true, true, 14},
+                   {"ours", "ours", "measured here, with its standard error", true, true, 18},
+                   {"wanted", "wanted", "limits that the published numbers imply", true, true, 14},
+                   {"verdict", "", "verdict", false, true, 14}};
+  table.name_column = 2;
+  return table;
 }
-inline std::string relation_text(const Relation& r) {
-  std::string text = fmt::format("{:<2} {:<14} {:<72} {:>14} {:>18} {:>14}  {}\n", r.check, r.scene, r.what,
-                                 r.published, ours_text(r), limit_text(r), verdict_name(r.verdict()));
-  if (!r.note.empty()) text += fmt::format("{:<18}{}\n", "", r.note);
-  return text;
+
+inline Row relation_row(const Relation& r) {
+  Row row;
+  row.cells = {{fmt::format("{}", r.check)},
+               {r.scene},
+               {r.what},
+               {r.published},
+               number_cell(r.ours, ours_text(r)),
+               number_cell(r.at_least ? *r.at_least : r.at_most.value_or(std::nan("")), limit_text(r)),
+               {verdict_name(r.verdict())}};
+  row.note = r.note;
+  return row;
 }
 
 inline nlohmann::ordered_json to_json(const Relation& r) {

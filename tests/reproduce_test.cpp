@@ -42,7 +42,8 @@ TEST(Reproduction, ReportsNumbersWithoutLimits) {
 TEST(Reproduction, PrintsOneLineARelationAndItsNoteBelow) {
   Relation r = relation(0.8517, 0.004, {}, 1);
   r.note = "RMSE 0.1 and 0.12";
-  const std::string text = relation_text(r);
+  const Table table = relation_table();
+  const std::string text = row_text(table, relation_row(r), text_widths(table));
   for (const char* part : {"6 ", "colonnade", "RMSE sst / slc", "0.79", "0.8517 +- 0.004", "<= 1", "holds"})
     EXPECT_NE(text.find(part), text.npos) << part << " in\n" << text;
   EXPECT_GT(text.find("RMSE 0.1 and 0.12"), text.find('\n'));

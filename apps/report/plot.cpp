@@ -111,7 +111,7 @@ Scale scale_of(const std::vector<double>& values, bool logarithmic, double from,
 
 std::vector<Tick> log_ticks(const Scale& scale) {
   std::vector<Tick> ticks;
-  const bool label_minor = scale.high - scale.low < 1.7;
+  const bool label_minor = scale.high - scale.low < (scale.from > scale.to ? 2.6 : 1.7);  // upwards there is more room
   for (int decade = static_cast<int>(std::floor(scale.low)); decade <= scale.high; ++decade)
     for (int digit = 1; digit < 10; ++digit) {
       const double value = digit * std::pow(10.0, decade);
@@ -172,7 +172,7 @@ Frame frame_of(const Plot& plot) {
   for (const Series& series : plot.series) longest = std::max(longest, std::min<std::size_t>(series.name.size(), 18));
   Frame frame{};
   frame.left = 66;
-  frame.right = plot.width - 22 - 6.6 * static_cast<double>(longest);
+  frame.right = plot.width - 24 - 7.6 * static_cast<double>(longest);
   frame.top = 18;
   frame.bottom = plot.height - 42;
   frame.x = scale_of(all_x(plot), plot.x.logarithmic, frame.left, frame.right);

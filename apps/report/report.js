@@ -175,6 +175,8 @@ function magma(t) {
 }
 const magmaTable = Array.from({ length: 256 }, (_, i) => magma(i / 255));
 const kNoBias = [150, 150, 150], kNoBlock = [90, 90, 90];
+// The faintest bias that is no noise must not look like none.
+const biasColor = t => blueWhiteRed(t === 0 ? 0 : Math.sign(t) * (0.2 + 0.8 * Math.abs(t)));
 
 // --- pictures as they are shown -----------------------------------------------------------------------------------
 
@@ -216,7 +218,7 @@ function paintAbsolute(reference, test) {
 function paintBias(bias) {
   const codes = Uint8Array.from(atob(bias.codes), c => c.charCodeAt(0));
   return painted(bias.columns, bias.rows, i => codes[i] === 0 ? kNoBlock : codes[i] === 128 ? kNoBias
-    : blueWhiteRed((codes[i] - 128) / 127), bias.columns * data.block, bias.rows * data.block);
+    : biasColor((codes[i] - 128) / 127), bias.columns * data.block, bias.rows * data.block);
 }
 
 // What stands in the way of showing a picture; null: nothing.
@@ -425,8 +427,10 @@ function fillValues() {
   if (!state.cursor) {
     caption.textContent = 'Linear RGB under the cursor: point at the picture, or press I, J, K or L';
     body.replaceChildren();
+    byId('values').tHead.hidden = true;
     return;
   }
+  byId('values').tHead.hidden = false;
   caption.textContent = `Linear RGB at pixel (${state.cursor.x}, ${state.cursor.y}), decoded from the embedded pictures`;
   const reference = valueCells('r');
   body.replaceChildren(...members().map(who => {
@@ -452,7 +456,7 @@ function scaleOf() {
     return { color: magma, ticks: [0, 0.25, 0.5, 0.75, 1].map(t => [t, String(t)]), text: 'FLIP: visible error of each pixel, 0 to 1.' };
   if (state.mode === 'bias') {
     const s = light().biasScale;
-    return { color: t => blueWhiteRed(2 * t - 1), ticks: [[0, minus('-' + percent(s))], [0.5, '0'], [1, '+' + percent(s)]],
+    return { color: t => biasColor(2 * t - 1), ticks: [[0, minus('-' + percent(s))], [0.5, '0'], [1, '+' + percent(s)]],
              text: `Mean of ${data.seeds} seeds minus reference in blocks of ${data.block}x${data.block} pixels: (Y - Yr) / (Y + Yr). ` +
                    'Grey: zero lies in the 95 % interval; by chance about one block in twenty has a colour all the same.' };
   }
@@ -524,7 +528,7 @@ function buildCrops() {
       button.addEventListener('click', () => showRegion(who, region));
       return button;
     });
-    return make('div', { className: 'crop-row' }, title, make('div', { className: 'crop-line' }, ...crops));
+    return make('div', { className: 'crop-row' }, title, make('div', { className: crops.length > 6 ? 'crop-line many' : 'crop-line' }, ...crops));
   }));
 }
 let cropsDrawn = '';

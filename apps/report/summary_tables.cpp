@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "html.h"
 
@@ -23,7 +24,7 @@ Row message_row(const Table& table, const std::string& name, const std::string& 
 
 // "+- 0.0012", with the mean's number of decimals.
 std::string half_width_text(const Interval& interval) {
-  return is_number(interval.low) ? "+- " + number_text((interval.high - interval.low) / 2, 2) : "";
+  return is_number(interval.low) && interval.high > interval.low ? "+- " + number_text((interval.high - interval.low) / 2, 2) : "";
 }
 
 Cell error_cell(const Interval& interval, bool best) {
@@ -74,7 +75,8 @@ Row summary_row(const Results& results, const SummaryRow& summary, Budget budget
   row.cells = {rank_cell(summary.ranks[0]), {method.name}};
   if (show_light) row.cells.push_back({method.light});
   row.cells.push_back({method.estimator});
-  row.cells.push_back(number_cell(summary.spp.mean, number_text(summary.spp.mean)));
+  const double spp = summary.spp.mean;
+  row.cells.push_back(number_cell(spp, spp == std::round(spp) ? fmt::format("{:.0f}", spp) : number_text(spp)));
   row.cells.push_back(number_cell(summary.seconds.mean, seconds_text(summary.seconds.mean)));
   row.cells.push_back(number_cell(summary.rays.mean, count_text(summary.rays.mean)));
   for (std::size_t m = 0; m < metrics().size(); ++m)
@@ -85,6 +87,12 @@ Row summary_row(const Results& results, const SummaryRow& summary, Budget budget
   }
   if (budget == Budget::kTime) row.cells.push_back(equal_error_cell(summary.equal_error));
   return row;
+}
+
+// The best first, by RMSE; what has none last.
+bool before(const SummaryRow& a, const SummaryRow& b) {
+  const bool a_known = is_number(a.errors[0].mean), b_known = is_number(b.errors[0].mean);
+  return a_known && b_known ? a.errors[0].mean < b.errors[0].mean : a_known && !b_known;
 }
 
 std::string why_nothing(const Results& results, const Contender& method, Budget budget) {
@@ -139,21 +147,19 @@ Table summary_table(const Results& results, Budget budget, const std::string& li
   table.caption[0] = static_cast<char>(std::toupper(table.caption[0]));
   table.columns = summary_columns(results, budget, show_light);
   table.name_column = 1;
-  std::vector<Row> failed;
-  const std::vector<SummaryRow> rows = summarize(results, budget);
+  std::vector<SummaryRow> rows = summarize(results, budget);
+  std::stable_sort(rows.begin(), rows.end(), [](const SummaryRow& a, const SummaryRow& b) { return before(a, b); });
+  std::vector<bool> shown(results.methods.size());
+  for (const SummaryRow& row : rows) {
+    const auto method = static_cast<std::size_t>(row.method);
+    if (chosen(results.methods[method], light)) table.rows.push_back(summary_row(results, row, budget, show_light));
+    shown[method] = true;
+  }
   for (std::size_t m = 0; m < results.methods.size(); ++m) {
     const Contender& method = results.methods[m];
-    if (!chosen(method, light)) continue;
-    const auto row = std::find_if(rows.begin(), rows.end(),
-                                  [&](const SummaryRow& r) { return r.method == static_cast<int>(m); });
-    if (row == rows.end())
-      failed.push_back(message_row(table, method.name, why_nothing(results, method, budget)));
-    else
-      table.rows.push_back(summary_row(results, *row, budget, show_light));
+    if (!shown[m] && chosen(method, light))
+      table.rows.push_back(message_row(table, method.name, why_nothing(results, method, budget)));
   }
-  std::stable_sort(table.rows.begin(), table.rows.end(),
-                   [](const Row& a, const Row& b) { return a.cells[0].value < b.cells[0].value; });
-  table.rows.insert(table.rows.end(), failed.begin(), failed.end());
   return table;
 }
 

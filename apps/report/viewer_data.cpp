@@ -1,6 +1,7 @@
 #include "viewer_data.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <map>
@@ -37,6 +38,7 @@ class ViewerBuilder {
   ViewerData build(std::size_t most_bytes);
 
  private:
+  std::optional<RgbImage> read_beauty(const std::string& file, std::string& why) const;
   std::optional<RgbImage> load(const std::string& key, const std::string& file);
   const Reference* reference_of(const std::string& light, int frame) const;
   const Run* run_of(int method, int seed, int frame) const;
@@ -62,17 +64,24 @@ class ViewerBuilder {
   std::map<std::string, std::vector<double>> biases_;  // of one light, before their common scale is known
 };
 
-// nullopt, and a word in `missing`, when there is no such image.
-std::optional<RgbImage> ViewerBuilder::load(const std::string& key, const std::string& file) {
+// nullopt, and why, when there is no such image.
+std::optional<RgbImage> ViewerBuilder::read_beauty(const std::string& file, std::string& why) const {
   try {
     RgbImage image = rgb_of(read_image(folder_ / file), "", file);
     if (image.width == results_.width && image.height == results_.height) return image;
-    missing_[key] = fmt::format("{} has {}x{} pixels, not {}x{}", file, image.width, image.height, results_.width,
-                                results_.height);
+    why = fmt::format("{} has {}x{} pixels, not {}x{}", file, image.width, image.height, results_.width, results_.height);
   } catch (const Error&) {
-    missing_[key] = fs::exists(folder_ / file) ? file + " cannot be read" : file + " is missing";
+    why = file + (fs::exists(folder_ / file) ? " cannot be read" : " is missing");
   }
   return std::nullopt;
+}
+
+// As above; what is missing is listed.
+std::optional<RgbImage> ViewerBuilder::load(const std::string& key, const std::string& file) {
+  std::string why;
+  std::optional<RgbImage> image = read_beauty(file, why);
+  if (!image) missing_[key] = why;
+  return image;
 }
 
 const Reference* ViewerBuilder::reference_of(const std::string& light, int frame) const {
@@ -107,13 +116,18 @@ std::optional<RgbImage> ViewerBuilder::load_stage(int method, Budget budget, std
 
 void ViewerBuilder::add_bias(int method, Budget budget, const RgbImage& reference, double rel_mse) {
   const std::string key = map_key(method, budget);
-  std::vector<BlockMeans> seeds;
-  for (const Run& run : results_.runs) {
-    if (run.method != method || run.frame != results_.frames.front() || run.stage(budget).file.empty()) continue;
-    if (const auto image = load("b/" + key, run.stage(budget).file)) seeds.push_back(block_means(*image));
-  }
+  std::vector<std::string> files;
+  for (const Run& run : results_.runs)
+    if (run.method == method && run.frame == results_.frames.front() && !run.stage(budget).file.empty())
+      files.push_back(run.stage(budget).file);
+  std::vector<BlockMeans> seeds(files.size());
+  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
+    std::string ignored;
+    if (const auto image = read_beauty(files[i], ignored)) seeds[i] = block_means(*image);
+  });
+  std::erase_if(seeds, [](const BlockMeans& means) { return means.values.empty(); });
   if (seeds.size() < 2)
-    missing_["b/" + key] = "a bias map needs at least two seeds";
+    missing_["b/" + key] = "a bias map needs pictures of at least two seeds";
   else
     biases_[key] = bias_of(seeds, block_means(reference), rel_mse);
 }
