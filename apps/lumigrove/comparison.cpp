@@ -223,20 +223,31 @@ class Contest {
       if (made.empty()) return false;
       for (auto& [light, reference] : made) {
         const std::string file = reference_file(light, frame).string();
-        save(reference.image, file);
+        save(reference.image, {{"emission", reference.emission}}, file);
         results_.references.push_back({light, frame, file, reference.origin, reference.errors});
       }
     }
     // As it is on disk, rounded, so that it is the same after a --resume.
     for (const Reference& reference : results_.references)
-      if (reference.frame == frame)
-        references_[reference.light] = rgb_of(read_image(job_.folder / reference.file), "", reference.file);
+      if (reference.frame == frame) references_[reference.light] = load(reference.file);
     return true;
   }
 
-  void save(const RgbImage& image, const std::string& file) const {
-    Image beauty{image.width, image.height, {{"", {"R", "G", "B"}, image.rgb, {}}}, {}};
-    write_image(beauty, job_.folder / file);
+  ReferenceImage load(const std::string& file) const {
+    const Image image = read_image(job_.folder / file);
+    ReferenceImage reference;
+    reference.image = rgb_of(image, "", file);
+    if (image.find("emission")) reference.emission = rgb_of(image, "emission", file);
+    return reference;
+  }
+
+  // Layers without values are left out.
+  void save(const RgbImage& image, const std::vector<std::pair<std::string, RgbImage>>& layers, const std::string& file) const {
+    const std::vector<std::string> rgb{"R", "G", "B"};
+    Image written{image.width, image.height, {{"", rgb, image.rgb, {}}}, {}};
+    for (const auto& [name, layer] : layers)
+      if (!layer.rgb.empty()) written.layers.push_back({name, rgb, layer.rgb, {}});
+    write_image(written, job_.folder / file);
   }
 
   // --- runs -------------------------------------------------------------------------------------------------------
@@ -326,9 +337,12 @@ class Contest {
   void measure(Entry& entry, bool takes_time, bool takes_samples) {
     const Contestant& contestant = *entry.contestant;
     const std::string& light = results_.methods[static_cast<std::size_t>(entry.method)].light;
-    RgbImage image = contestant.image(light);
+    const ReferenceImage& shown = references_.at(light);
+    const RgbImage& reference = shown.image;
+    const bool whole = light == kAllLight || light == kDirectLight;
+    RgbImage image = with_emission(contestant.image(light), shown.emission);
+    if (whole && shown.emission.rgb.empty()) image = with_emission(image, contestant.part(&FilmPixel::emission));
     image.name = name_of(entry);
-    const RgbImage& reference = references_.at(light);
     CurvePoint point{contestant.spp(), contestant.seconds(), contestant.rays(), rmse(reference, image),
                      rel_mse(reference, image)};
     if (entry.run.curve.empty() || entry.run.curve.back().spp < point.spp) entry.run.curve.push_back(point);
@@ -340,10 +354,17 @@ class Contest {
       stage.file = (fs::path("images") / fmt::format("{:02}-{}.{}.s{}{}.exr", entry.method, slug(name_of(entry)),
                                                      budget_key(budget), entry.run.seed, frame_suffix(entry.run.frame)))
                        .string();
-      save(image, stage.file);
+      save(image, parts(contestant), stage.file);
       if (entry.run.seed == 0 && entry.run.frame == results_.frames.front()) note_command(entry, budget, stage);
       entry.run.stages[static_cast<std::size_t>(budget)] = std::move(stage);
     }
+  }
+
+  static std::vector<std::pair<std::string, RgbImage>> parts(const Contestant& contestant) {
+    std::vector<std::pair<std::string, RgbImage>> parts{{"direct", contestant.part(&FilmPixel::direct)}};
+    if (contestant.settings().indirect.transport != Transport::kNone)
+      parts.emplace_back("indirect", contestant.part(&FilmPixel::indirect));
+    return parts;
   }
 
   void note_command(const Entry& entry, Budget budget, const Stage& stage) {
@@ -360,7 +381,7 @@ class Contest {
   std::uint64_t emitters_ = 0;
   std::shared_ptr<Geometry> geometry_;
   std::vector<Entry> entries_;
-  std::map<std::string, RgbImage> references_;  // of the frame at hand, by light
+  ReferenceImages references_;  // of the frame at hand, by light
   double work_done_ = 0, work_total_ = 0, reference_work_ = 0;  // seconds, predicted
 };
 

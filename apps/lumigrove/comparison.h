@@ -7,6 +7,8 @@
 // Equal time     the whole number of samples that ends nearest to the budget
 // Equal samples  the same number for all. A budget that was not asked for follows from the other: as many samples as the
 //           slowest method takes in the time, or the time that the fastest takes for the samples.
+// Images        light that surfaces reflect, as the method finds it, and emission that the camera sees directly as the reference
+//           has it: no method samples that, and its noise would drown their differences.
 // Reference the mean of two halves with seeds of their own; half their difference is how wrong it is itself.
 #pragma once
 

@@ -46,17 +46,21 @@ Errors errors_of_variance(const Image& image, const RgbImage& beauty) {
   return errors;
 }
 
+bool shows_emission(const std::string& light) { return light == kAllLight || light == kDirectLight; }
+
+// A file from elsewhere has a beauty only, made for this purpose.
 RgbImage light_in_file(const Image& image, const std::string& light, const std::string& file) {
-  if (light == kAllLight) return rgb_of(image, "", file);
-  if (light != kDirectLight) return rgb_of(image, light, file);
-  if (!image.find("direct")) return rgb_of(image, "", file);  // made elsewhere, for this purpose
-  RgbImage direct = rgb_of(image, "direct", file);
-  const RgbImage emission = rgb_of(image, "emission", file);
-  for (std::size_t i = 0; i < direct.rgb.size(); ++i) direct.rgb[i] += emission.rgb[i];
-  return direct;
+  if (!shows_emission(light)) return rgb_of(image, light, file);
+  if (light == kAllLight || !image.find("direct")) return rgb_of(image, "", file);
+  return with_emission(rgb_of(image, "direct", file), rgb_of(image, "emission", file));
 }
 
 }  // namespace
+
+RgbImage with_emission(RgbImage image, const RgbImage& emission) {
+  for (std::size_t i = 0; i < emission.rgb.size(); ++i) image.rgb[i] += emission.rgb[i];
+  return image;
+}
 
 ReferenceImages render_reference(const Scene& scene, const std::shared_ptr<Geometry>& geometry, const Settings& settings,
                                  const BudgetSpec& budget, const std::vector<std::string>& lights,
@@ -71,10 +75,12 @@ ReferenceImages render_reference(const Scene& scene, const std::shared_ptr<Geome
   ReferenceImages images;
   if (second.spp() == 0) return images;
   if (first.spp() > second.spp()) second.sample();  // halves of equal weight
+  const RgbImage emission = mean_of(first.part(&FilmPixel::emission), second.part(&FilmPixel::emission));
   for (const std::string& light : lights) {
     ReferenceImage reference;
-    const RgbImage half = first.image(light);
-    reference.image = mean_of(half, second.image(light));
+    if (shows_emission(light)) reference.emission = emission;
+    const RgbImage half = with_emission(first.image(light), reference.emission);
+    reference.image = mean_of(half, with_emission(second.image(light), reference.emission));
     reference.errors = errors_of_halves(reference.image, half, metrics);
     reference.origin = fmt::format("{}, {} spp in two halves, {:.1f} s", settings.preset, first.spp() + second.spp(),
                                    first.seconds() + second.seconds());
@@ -92,6 +98,7 @@ ReferenceImages read_reference(const std::string& file, int width, int height, c
   for (const std::string& light : lights) {
     ReferenceImage reference;
     reference.image = light_in_file(image, light, file);
+    if (shows_emission(light) && image.find("emission")) reference.emission = rgb_of(image, "emission", file);
     if (light == kAllLight) reference.errors = errors_of_variance(image, reference.image);
     reference.origin = file;
     images[light] = std::move(reference);

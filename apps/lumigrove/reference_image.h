@@ -11,11 +11,15 @@
 namespace lumigrove {
 
 struct ReferenceImage {
-  RgbImage image;
+  RgbImage image;     // with its emission
+  RgbImage emission;  // seen directly; stands in the images of all methods too. Empty: they show their own, or none
   Errors errors = kNoErrors;  // its own; NaN: unknown
   std::string origin;
 };
 using ReferenceImages = std::map<std::string, ReferenceImage>;  // by light
+
+// `emission` may be empty.
+RgbImage with_emission(RgbImage image, const RgbImage& emission);
 
 // Called after every sample with the seconds so far; false ends it early.
 using KeepGoing = std::function<bool(double seconds)>;
