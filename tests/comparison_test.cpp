@@ -179,18 +179,23 @@ TEST_F(MethodComparison, SequencesHaveAReferenceAndChangesOfEveryFrame) {
 
 // A method with indirect light and one without are measured on what they find.
 TEST_F(MethodComparison, DirectLightIsMeasuredAgainstDirectLight) {
-  ASSERT_EQ(compare({"--methods", "tree,path", "--budget", "16spp", "--seeds", "1", "--reference-budget", "256spp"}).status, 0);
+  ASSERT_EQ(compare({"--methods", "tree,path", "--budget", "16spp", "--seeds", "1", "--reference-budget", "256spp",
+                     "--reference-method", "path,tree"})
+                .status,
+            0);
   const Results r = results();
   EXPECT_EQ(r.methods[0].light, "direct light");
   EXPECT_EQ(r.methods[1].light, "all light");
   ASSERT_EQ(r.references.size(), 2u);
+  for (const Reference& reference : r.references)
+    EXPECT_TRUE(reference.origin.starts_with(reference.light == "direct light" ? "tree" : "path")) << reference.origin;
   const auto mean = [&](const std::string& file) {
     const RgbImage image = rgb_of(read_image(folder_ / "c" / file), "", file);
     double sum = 0;
     for (const float value : image.rgb) sum += static_cast<double>(value);
     return sum / static_cast<double>(image.rgb.size());
   };
-  EXPECT_NEAR(mean(r.references[1].file) / mean(r.runs[0].stage(Budget::kSamples).file), 1, 0.02);
+  EXPECT_NEAR(mean(r.references[r.references[0].light == "direct light" ? 0 : 1].file) / mean(r.runs[0].stage(Budget::kSamples).file), 1, 0.02);
 }
 
 // Emission seen directly is the same in all images, so that only what methods do is measured.

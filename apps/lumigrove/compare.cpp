@@ -81,16 +81,23 @@ std::string reference_preset() {
   throw std::logic_error("no preset is the reference");
 }
 
+bool finds_indirect(const ComparedMethod& method) {
+  return method.failure.empty() && method.settings.indirect.transport != Transport::kNone;
+}
+
 // What the methods find is what the reference must find; more of it would only cost time.
-void fit_reference(const std::vector<ComparedMethod>& methods, bool chosen, ComparedMethod& reference) {
-  const auto has_indirect = [](const ComparedMethod& method) {
-    return method.failure.empty() && method.settings.indirect.transport != Transport::kNone;
-  };
-  const bool wanted = std::any_of(methods.begin(), methods.end(), has_indirect);
-  if (!wanted && !chosen) reference.settings.indirect.max_bounces = 0;
-  if (wanted && reference.settings.indirect.transport == Transport::kNone)
+void make_references(const CompareOptions& options, ComparisonJob& job) {
+  const bool chosen = !options.reference_method.empty();
+  for (const MethodSpec& spec : parse_methods({chosen ? options.reference_method : reference_preset()})) {
+    ComparedMethod method = make_method(options, spec, without_methods(*options.settings));
+    if (!method.failure.empty()) throw Error(fmt::format("--reference-method: {}", method.failure));
+    job.reference_methods.push_back(std::move(method));
+  }
+  const bool wanted = std::any_of(job.methods.begin(), job.methods.end(), finds_indirect);
+  if (!wanted && !chosen) job.reference_methods.front().settings.indirect.max_bounces = 0;
+  if (wanted && std::none_of(job.reference_methods.begin(), job.reference_methods.end(), finds_indirect))
     throw Error(fmt::format("--reference-method {} finds direct light only, but a method that is compared finds more",
-                            reference.spec.name));
+                            options.reference_method));
 }
 
 std::string default_folder(const std::string& scene) {
@@ -113,12 +120,7 @@ ComparisonJob make_job(const CompareOptions& options) {
   job.seeds = static_cast<int>(parse_integer("--seeds", options.seeds, {1, 1000}));
   job.reference_file = options.images.reference;
   job.reference_budget = parse_budget("--reference-budget", options.reference_budget);
-  const bool chosen = !options.reference_method.empty();
-  const MethodSpec reference = parse_method(chosen ? options.reference_method : reference_preset());
-  job.reference_method = make_method(options, reference, without_methods(*options.settings));
-  if (!job.reference_method.failure.empty())
-    throw Error(fmt::format("--reference-method: {}", job.reference_method.failure));
-  if (job.reference_file.empty()) fit_reference(job.methods, chosen, job.reference_method);
+  if (job.reference_file.empty()) make_references(options, job);
   job.layer = options.images.layer;
   if (!options.frames.empty()) {
     job.frames = parse_frames(options.frames);
@@ -208,7 +210,8 @@ void add_method_options(CLI::App& command, const std::shared_ptr<CompareOptions>
   list("--budget", options->budget, "10s|64spp",
        "Time and number of samples that every method has with every seed; of one alone the other follows");
   text("--seeds", options->seeds, "N", "Runs of every method, for 95 % intervals (default 4)");
-  text("--reference-method", options->reference_method, "NAME", "What renders the reference (default path)");
+  text("--reference-method", options->reference_method, "NAME[,NAME]",
+       "What renders the reference (default path); a second one without indirect light that of direct light");
   list("--reference-budget", options->reference_budget, "60s|512spp",
        "Of the reference (default: as long as all methods together)");
   auto* frames = text("--frames", options->frames, "A-BxS", "Frames of a sequence to compare, each with its reference");

@@ -202,16 +202,34 @@ class Contest {
     return budget;
   }
 
+  // Direct light has a method of its own where one was given that finds nothing else.
+  const ComparedMethod& reference_method(const std::string& light) const {
+    for (const ComparedMethod& method : job_.reference_methods)
+      if ((method.settings.indirect.transport == Transport::kNone) == (light == kDirectLight)) return method;
+    return job_.reference_methods.front();
+  }
+
+  // Methods share the budget.
   ReferenceImages make_reference(int frame) {
     if (!job_.reference_file.empty())
       return read_reference(job_.reference_file, results_.width, results_.height, lights());
-    const double before = work_done_;
-    return render_reference(scene_, geometry_, settings_at(job_, scene_, job_.reference_method.settings, frame), reference_budget(),
-                            lights(), job_.metrics, [&](double seconds) {
-                              work_done_ = before + std::min(seconds, reference_work_);
-                              tell("reference");
-                              return !guard_.interrupted();
-                            });
+    std::map<const ComparedMethod*, std::vector<std::string>> lights_of;
+    for (const std::string& light : lights()) lights_of[&reference_method(light)].push_back(light);
+    const double share = 1.0 / static_cast<double>(lights_of.size());
+    BudgetSpec budget = reference_budget();
+    budget.seconds *= share;
+    ReferenceImages images;
+    for (const auto& [method, lights] : lights_of) {
+      const double before = work_done_;
+      const Settings settings = settings_at(job_, scene_, method->settings, frame);
+      images.merge(render_reference(scene_, geometry_, settings, budget, lights, job_.metrics, [&](double seconds) {
+        work_done_ = before + std::min(seconds, share * reference_work_);
+        tell("reference");
+        return !guard_.interrupted();
+      }));
+      if (guard_.interrupted() && images.count(lights.front()) == 0) return {};
+    }
+    return images;
   }
 
   // False: interrupted before there was one.

@@ -36,7 +36,7 @@ struct ComparisonJob {
   std::vector<ComparedMethod> methods;
   BudgetSpec budget;
   int seeds = 4;
-  ComparedMethod reference_method;
+  std::vector<ComparedMethod> reference_methods;  // one that finds all light that is compared; perhaps one for direct light
   BudgetSpec reference_budget;  // neither: as long as all methods together
   std::string reference_file;   // instead of the method; empty: none
   std::string layer;            // measured instead of what each method finds; empty: none
