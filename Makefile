@@ -26,6 +26,10 @@ help:
 dependencies:
 	@scripts/install-dependencies.sh
 
+.PHONY: test-dependencies
+test-dependencies:
+	@scripts/install-dependencies.sh tests
+
 .PHONY: configure
 configure: dependencies
 	$(call CONFIGURE,release)
@@ -42,7 +46,7 @@ demo: build
 
 # The tests of everything that reads or writes files run a second time, under sanitizers.
 .PHONY: test
-test: configure
+test: test-dependencies configure
 	cmake --build $(RELEASE) --parallel $(JOBS)
 	$(call CONFIGURE,sanitize)
 	cmake --build $(SANITIZE) --parallel $(JOBS) --target lumigrove_input_tests
@@ -55,7 +59,7 @@ bench: configure
 	$(RELEASE)/bench/lumigrove-bench
 
 .PHONY: sanitize
-sanitize: dependencies
+sanitize: test-dependencies
 	$(call CONFIGURE,sanitize)
 	cmake --build $(SANITIZE) --parallel $(JOBS)
 	$(call CTEST,$(SANITIZE))

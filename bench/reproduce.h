@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -80,12 +81,19 @@ inline Table relation_table(const std::string& caption = {}) {
   return table;
 }
 
+// For sorting; NaN when the text starts with none.
+inline double leading_number(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  return end == text.c_str() ? std::nan("") : value;
+}
+
 inline Row relation_row(const Relation& r) {
   Row row;
   row.cells = {{fmt::format("{}", r.check)},
                {r.scene},
                {r.what},
-               {r.published},
+               number_cell(leading_number(r.published), r.published),
                number_cell(r.ours, ours_text(r)),
                number_cell(r.at_least ? *r.at_least : r.at_most.value_or(std::nan("")), limit_text(r)),
                {verdict_name(r.verdict())}};

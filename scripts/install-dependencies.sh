@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs the Debian packages that building and testing Lumigrove needs. Touches neither network nor disk when all of
-# them are there already, so that it can run before every build.
+# Installs the Debian packages that building Lumigrove needs and, with the argument `tests`, what only its tests need.
+# Touches neither network nor disk when all of them are there already, so that it can run before every build.
 set -euo pipefail
 
 packages=(
@@ -14,6 +14,14 @@ packages=(
   libgtest-dev libbenchmark-dev                # tests, bench
   assimp-testmodels                            # files that the importers are tested with
 )
+test_packages=(
+  chromium chromium-driver python3-selenium    # a browser in which the report of a comparison is tested
+)
+case "${1:-}" in
+  "") ;;
+  tests) packages+=("${test_packages[@]}") ;;
+  *) echo "install-dependencies: unknown argument '$1'; there is only: tests" >&2; exit 2 ;;
+esac
 
 installed() { [ "$(dpkg-query -W -f='${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
 

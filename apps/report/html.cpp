@@ -64,7 +64,7 @@ std::string seconds_text(double seconds) {
   if (!is_number(seconds)) return "-";
   if (seconds == 0) return "0 s";
   if (seconds < 0.9995) return number_text(1e3 * seconds) + " ms";
-  if (seconds < 119.5) return number_text(seconds) + " s";
+  if (seconds < 119.5) return (seconds == std::round(seconds) ? fmt::format("{:.0f}", seconds) : number_text(seconds)) + " s";
   const double whole = std::round(seconds);
   return fmt::format("{:.0f} min {:.0f} s", std::floor(whole / 60), std::fmod(whole, 60));
 }
