@@ -15,6 +15,7 @@
 #include "frame_changes.h"
 #include "output.h"
 #include "page.h"
+#include "plot_files.h"
 #include "reference_image.h"
 #include "render_job.h"
 
@@ -71,6 +72,7 @@ class Contest {
     results_.complete = !guard_.interrupted();
     results_.changes = frame_changes(results_, job_.folder, job_.metrics.tone);
     write_results(results_, job_.folder);
+    write_plots(results_, job_.folder);
     write_report(results_, job_.folder);
   }
 

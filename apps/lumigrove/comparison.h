@@ -51,7 +51,7 @@ struct ComparisonJob {
   ProgressStyle progress = ProgressStyle::kSilent;
 };
 
-// Writes EXRs, results.json and report.html into the folder and returns what the file holds. An interrupt ends it early
+// Writes EXRs, plots, results.json and report.html into the folder and returns what the file holds. An interrupt ends it early
 // with what was measured until then (Results::complete is false). Throws Error when there is nothing to measure or the
 // folder holds another comparison.
 Results run_comparison(const ComparisonJob& job, const InterruptGuard& guard);

@@ -94,9 +94,11 @@ void take_up(Results& now, Results old, const std::string& folder) {
   const auto same = [&](const char* what, const auto& was, const auto& is) {
     if (was != is) throw Error(fmt::format("{}: cannot be resumed: {} was '{}' and is '{}'", folder, what, was, is));
   };
-  same("the program", old.version, now.version);
-  same("the processor", old.machine.processor, now.machine.processor);
-  same("the number of threads", old.machine.threads, now.machine.threads);
+  if (const bool measures_more = !old.complete || now.seeds > old.seeds; measures_more) {
+    same("the program", old.version, now.version);
+    same("the processor", old.machine.processor, now.machine.processor);
+    same("the number of threads", old.machine.threads, now.machine.threads);
+  }
   same("the scene's hash", old.scene_hash, now.scene_hash);
   same("the environment", old.environment, now.environment);
   same("the width", old.width, now.width);
@@ -119,6 +121,10 @@ void take_up(Results& now, Results old, const std::string& folder) {
   if (now.budget_s > 0) same("the budget of seconds", old.budget_s, now.budget_s);
   if (now.budget_spp > 0) same("the budget of samples", old.budget_spp, now.budget_spp);
   now.date = old.date;
+  now.version = old.version;
+  now.machine = old.machine;
+  now.command = old.command;
+  now.seeds = std::max(now.seeds, old.seeds);
   now.budget_s = old.budget_s;
   now.budget_spp = old.budget_spp;
   now.scene_summary = old.scene_summary;

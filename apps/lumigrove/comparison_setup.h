@@ -22,7 +22,8 @@ std::string render_command(const ComparisonJob& job, Settings settings, int spp,
 // Everything that is known before the first sample.
 Results describe_job(const ComparisonJob& job, const Scene& scene);
 
-// Takes over what `old` measured. Refuses (Error) anything but the same comparison; more seeds may be asked for.
+// Takes over what `old` measured. Refuses (Error) anything but the same comparison; more seeds may be asked for. When
+// nothing is left to measure, program and machine may be others: only the report is written again.
 void take_up(Results& now, Results old, const std::string& folder);
 
 }  // namespace lumigrove
