@@ -94,7 +94,8 @@ void take_up(Results& now, Results old, const std::string& folder) {
   const auto same = [&](const char* what, const auto& was, const auto& is) {
     if (was != is) throw Error(fmt::format("{}: cannot be resumed: {} was '{}' and is '{}'", folder, what, was, is));
   };
-  if (const bool measures_more = !old.complete || now.seeds > old.seeds; measures_more) {
+  const bool measures_more = !old.complete || now.seeds > old.seeds;
+  if (measures_more) {
     same("the program", old.version, now.version);
     same("the processor", old.machine.processor, now.machine.processor);
     same("the number of threads", old.machine.threads, now.machine.threads);
@@ -117,6 +118,7 @@ void take_up(Results& now, Results old, const std::string& folder) {
     same("the settings of a method", old.methods[i].settings, now.methods[i].settings);
     same("the light of a method", old.methods[i].light, now.methods[i].light);
     now.methods[i].commands = old.methods[i].commands;
+    if (!measures_more) now.methods[i].failure = old.methods[i].failure;  // else it may try again
   }
   if (now.budget_s > 0) same("the budget of seconds", old.budget_s, now.budget_s);
   if (now.budget_spp > 0) same("the budget of samples", old.budget_spp, now.budget_spp);
