@@ -18,5 +18,6 @@ void add_list_command(CLI::App& app);     // list.cpp
 void add_rerun_command(CLI::App& app);    // rerun.cpp
 void add_compare_command(CLI::App& app);  // compare.cpp
 void add_tree_command(CLI::App& app);     // tree.cpp
+void add_audit_command(CLI::App& app);    // audit.cpp
 
 }  // namespace lumigrove

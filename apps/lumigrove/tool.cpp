@@ -91,6 +91,7 @@ void add_commands(CLI::App& app) {
   add_rerun_command(app);
   add_compare_command(app);
   add_tree_command(app);
+  add_audit_command(app);
   add_scene_command(app);
   add_list_command(app);
 }
