@@ -16,7 +16,8 @@
 //             |mean - S| : Bernstein's bound for V, or for the estimates' own variance where that is greater, and for the
 //             largest possible f_l / c_l. Rare bright lights, which a z-test would take for bias, fail nobody
 // Departures  p-values are corrected for the number of tests in the audit (Sidak).
-// Estimator   S is the sum over stratified points of every light; its own error, from E[f_l^2], is part of V.
+// Estimator   S is the sum over stratified points of every light, more of them on lights nearby; its own error, from
+//             E[f_l^2], is part of V.
 // In -> Out   sampler, points -> AuditRow; all rows -> judge() -> verdicts and sentences
 // Oracle      tests/audit_test.cpp: liars are caught by name, honest samplers pass.
 #pragma once

@@ -78,17 +78,30 @@ class LightNames {
 
 // --- what lights send ----------------------------------------------------------------------------------------
 
+constexpr int kStrataOfEnvironment = 64;
+
 // Points on a light: of few lights more, so that their sum is well known, in a square of strata.
 int strata_of(std::size_t lights) {
   const double points = std::clamp(65536.0 / static_cast<double>(std::max<std::size_t>(1, lights)), 4.0, 4096.0);
   return static_cast<int>(std::sqrt(points));
 }
 
+// Near a light what it sends changes fast from point to point of it.
+int strata_near(const Emitter& e, vec3 x, int strata) {
+  constexpr float kMostStrata = 64;
+  const Box3 box = emitter_bounds(e);
+  const float near = glm::length(glm::clamp(x, box.lo, box.hi) - x);
+  const float wanted = near > 0 ? glm::min(8 * box.diagonal() / near, kMostStrata) : kMostStrata;
+  return std::max(strata, static_cast<int>(std::ceil(wanted)));
+}
+
 LightMoments moments_of_light(const LightSampler& sampler, const Surface& surface, int strata, std::uint32_t seed) {
-  const bool plain = sampler.one < sampler.lights.emitters.size() ? !sampler.lights.emitters[sampler.one].triangle()
-                                                                 : sampler.one + 1 < light_count(sampler.lights) ||
-                                                                       !sampler.lights.environment.present();
-  const int side = plain ? 1 : strata;
+  const bool local = sampler.one < sampler.lights.emitters.size();
+  const bool environment = sampler.lights.environment.present() && sampler.one + 1 == light_count(sampler.lights);
+  const bool plain = local ? !sampler.lights.emitters[sampler.one].triangle() : !environment;
+  int side = 1;
+  if (environment) side = kStrataOfEnvironment;
+  if (local && !plain) side = strata_near(sampler.lights.emitters[sampler.one], surface.position, strata);
   double sum = 0, squares = 0, most = 0;
   for (int k = 0; k < side * side; ++k) {
     const vec4 u = Rng{seed, sampler.one, static_cast<std::uint32_t>(k)}.uniform4(0);
