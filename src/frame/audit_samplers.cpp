@@ -183,7 +183,10 @@ struct Part {
 class DirectAtPoint {
  public:
   DirectAtPoint(MakeLighting make, const std::vector<std::uint32_t>* leaves, const Surface& surface, std::uint32_t number)
-      : make_(std::move(make)), surface_(surface), lighting_(make_(0)), groups_(group_probabilities(lighting_.sampler, surface)) {
+      : make_(std::move(make)),
+        surface_(surface),
+        lighting_(make_(0)),
+        groups_(group_probabilities(lighting_.sampler, surface)) {
     if (leaves && !leaves->empty()) lighting_.sampler.tree.emitter_leaves = leaves->data();
     tile_ = make_tile(surface, side(), interleave(), shares(), lighting_.sampler.lights.diagonal, number);
     find_parts();
