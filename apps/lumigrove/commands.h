@@ -19,5 +19,6 @@ void add_list_command(CLI::App& app);     // list.cpp
 void add_rerun_command(CLI::App& app);    // rerun.cpp
 void add_compare_command(CLI::App& app, const std::string& command_line);  // compare.cpp; for its receipt
 void add_tree_command(CLI::App& app);     // tree.cpp
+void add_audit_command(CLI::App& app);    // audit.cpp
 
 }  // namespace lumigrove

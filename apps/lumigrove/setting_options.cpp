@@ -176,6 +176,18 @@ std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command, const std
   return options;
 }
 
+bool gives(const SettingOptions& options, const std::string& key) {
+  const auto is_key = [&](const auto& pair) { return pair.first == key; };
+  const auto assigns = [&](const std::string& text) { return text.starts_with(key + '='); };
+  if (std::any_of(options.values.begin(), options.values.end(), is_key)) return true;
+  if (std::any_of(options.assignments.begin(), options.assignments.end(), assigns)) return true;
+  for (const std::string& file : options.files) {
+    const SettingValues values = read_settings_file(file);
+    if (std::any_of(values.begin(), values.end(), is_key)) return true;
+  }
+  return false;
+}
+
 Settings make_settings(const SettingOptions& options) {
   Settings settings = options.preset.empty() ? Settings{} : make_preset(options.preset);
   for (const std::string& file : options.files) apply_file(file, !options.preset.empty(), settings);

@@ -99,6 +99,7 @@ void add_commands(CLI::App& app, const std::string& line) {
   add_rerun_command(app);
   add_compare_command(app, line);
   add_tree_command(app);
+  add_audit_command(app);
   add_scene_command(app);
   add_list_command(app);
 }
