@@ -238,6 +238,8 @@ TEST_F(MethodComparison, SlipsGetOneSentence) {
       {{"compare", "absent.glb", "--methods", "tree", "--budget", "1spp"}, "absent.glb"},
       {{"compare", "single", "--budget", "1spp"}, "--methods"},
       {{"compare", "single"}, "not an image"},
+      {{"compare", "single", "--methods", "tree", "--budget", "1spp", "--pixelbounds", "0", "8", "0", "8"}, "whole images"},
+      {{"compare", "single", "--methods", "tree", "--budget", "1spp", "--fail-above", "rmse=1"}, "for comparing images"},
   };
   for (const Slip& slip : slips) {
     const Outcome outcome = run(slip.words);

@@ -45,10 +45,17 @@ struct CompareOptions {
 // Settings that all have are given like those of `render`, but for what a comparison decides itself.
 void check_common_settings(const SettingOptions& given) {
   if (!given.preset.empty()) throw Error("--preset has no place in a comparison; --methods names its methods");
-  for (const auto& [key, value] : given.values)
+  bool cropped = !given.crop_window.empty() || !given.pixel.empty();
+  for (const auto& [key, value] : given.values) {
     if (key == "spp") throw Error(fmt::format("--spp has no place in a comparison; write --budget {}spp", value));
-  if (!given.crop_window.empty() || !given.pixel.empty())
-    throw Error("a comparison measures whole images; leave --cropwindow, --pixelbounds and --pixel out");
+    cropped = cropped || key == "pixel_bounds";
+  }
+  if (cropped) throw Error("a comparison measures whole images; leave --cropwindow, --pixelbounds and --pixel out");
+}
+
+// They would only be refused.
+void hide_options_of_one_image(CLI::App& command) {
+  for (const char* name : {"--preset", "--spp", "--cropwindow", "--pixelbounds", "--pixel"}) command.get_option(name)->group("");
 }
 
 bool is_of_method(const std::string& key) { return key.starts_with("direct.") || key.starts_with("indirect."); }
@@ -106,6 +113,8 @@ std::string default_folder(const std::string& scene) {
 }
 
 ComparisonJob make_job(const CompareOptions& options) {
+  if (!options.images.fail_above.empty() || !options.images.fail_below.empty())
+    throw Error("--fail-above and --fail-below are for comparing images");
   if (options.images.images.size() != 1) throw Error("--methods compares methods on one scene; name one");
   check_common_settings(*options.settings);
   ComparisonJob job;
@@ -284,6 +293,7 @@ void add_compare_command(CLI::App& app, const std::string& command_line) {
   add_method_options(*command, options);
   add_scene_parameters(*command, options->scene);
   options->settings = add_setting_options(*command, "--threads,--nthreads");
+  hide_options_of_one_image(*command);
   options->view = add_view_options(*command);
   add_progress_option(*command, options->progress);
   options->log = add_log_options(*command);

@@ -156,7 +156,7 @@ class Contest {
     for (Entry& entry : entries_) {
       tell("settling the budgets");
       const bool works = attempt(entry.method, [&] {
-        entry.contestant->begin(static_cast<std::uint32_t>(results_.first_seed));
+        entry.contestant->begin(results_.first_seed);
         const double build_s = entry.contestant->seconds();
         entry.contestant->sample();
         entry.sample_s = entry.contestant->median_sample_s();
@@ -306,7 +306,7 @@ class Contest {
       entry.run.method = entry.method;
       entry.run.seed = seed;
       entry.run.frame = frame;
-      const auto begin = [&] { entry.contestant->begin(static_cast<std::uint32_t>(results_.first_seed + seed)); };
+      const auto begin = [&] { entry.contestant->begin(results_.first_seed + static_cast<std::uint32_t>(seed)); };
       if (attempt(entry.method, begin)) running.push_back(&entry);
     }
     while (!running.empty() && !guard_.interrupted()) {

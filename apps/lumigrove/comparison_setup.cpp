@@ -83,7 +83,7 @@ Results describe_job(const ComparisonJob& job, const Scene& scene) {
   r.budget_s = job.budget.seconds;
   r.budget_spp = job.budget.spp;
   r.seeds = job.seeds;
-  r.first_seed = static_cast<int>(any.seed);
+  r.first_seed = any.seed;
   r.frames = job.frames.empty() ? std::vector<int>{any.frame} : job.frames;
   r.fps = job.frames.empty() ? 0 : job.fps;
   for (const ComparedMethod& method : job.methods) r.methods.push_back(describe_method(job, method));

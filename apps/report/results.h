@@ -116,7 +116,8 @@ struct Results {
   double pixels_per_degree = kPixelsPerDegree;
   double budget_s = 0;        // equal time
   int budget_spp = 0;         // equal samples
-  int seeds = 0, first_seed = 0;
+  int seeds = 0;
+  std::uint32_t first_seed = 0;
   std::vector<int> frames;    // at least one
   double fps = 0;             // of a sequence
   bool complete = false;      // false: interrupted; the rest can be resumed
