@@ -135,7 +135,7 @@ TEST(ReportTable, ShowsBestMethodFirstAndFailuresLast) {
   const TempFolder folder;
   Results results = fixtures::still(folder.path());
   results.methods[0].failure = "it broke";
-  std::erase_if(results.runs, [](const Run& run) { return run.method == 0; });
+  std::erase_if(results.runs, [](const lumigrove::Run& run) { return run.method == 0; });
   const Table table = summary_table(results, Budget::kTime);
   ASSERT_EQ(table.rows.size(), 3u);
   EXPECT_EQ(table.rows[0].cells[1].text, "same");
