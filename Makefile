@@ -14,7 +14,7 @@ CTEST = ctest --test-dir $(1) --output-on-failure --parallel $(JOBS)
 
 .PHONY: help
 help:
-	@echo "make demo      install what is missing, build, render the built-in night city to out/"
+	@echo "make demo      install what is missing, build, render the built-in night city to out/, compare methods on it"
 	@echo "make test      install what is missing, build, run every test"
 	@echo "make build     the library and the tool, in $(RELEASE)"
 	@echo "make bench     build and run the bench"
@@ -42,6 +42,7 @@ build: configure
 demo: build
 	@mkdir -p out
 	$(LUMIGROVE) render night-city --size 1280 720 --spp 16 -o out/night-city.exr -o out/night-city.png --stats
+	$(LUMIGROVE) compare night-city --methods tree,pool,power --size 480 270 --budget 2s --seeds 2 -o out/comparison --force
 
 # The tests of everything that reads or writes files run a second time, under sanitizers.
 .PHONY: test

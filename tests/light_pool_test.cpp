@@ -35,25 +35,8 @@ std::vector<TreeSample> walk(const LightTreeView& tree, const WalkRegion& region
   return samples;
 }
 
-// Probability of a leaf: the product of the steps to it.
-template <int W>
 float pdf_in_region(const LightTreeView& tree, const WalkRegion& region, std::uint32_t leaf) {
-  float pdf = 1;
-  std::uint64_t span = 1;
-  for (int level = 1; level < tree.levels; ++level) span *= W;
-  for (int level = 0; level < tree.levels; ++level, span /= W) {
-    const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
-    const ChildWeights<W> children =
-        weigh_children_of_region<W>(node, 0, W, weighing_of_level(tree, level, tree.weights), region);
-    if (!(children.total > 0)) return 0;
-    alignas(64) float weights[W];
-    store_lanes<W>(children.weight, weights);
-    pdf *= weights[leaf / span % W] / children.total;
-  }
-  return pdf;
-}
-float pdf_in_region(const LightTreeView& tree, const WalkRegion& region, std::uint32_t leaf) {
-  return with_width(tree.width, [&](auto w) { return pdf_in_region<w>(tree, region, leaf); });
+  return pdf_leaf_in_region(tree, region, whole_tree(tree), leaf);
 }
 
 std::vector<WalkRegion> some_regions(int n, std::uint32_t seed) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
 
 namespace lumigrove {
 
@@ -16,7 +17,8 @@ void add_render_command(CLI::App& app);   // render.cpp
 void add_scene_command(CLI::App& app);    // scene.cpp
 void add_list_command(CLI::App& app);     // list.cpp
 void add_rerun_command(CLI::App& app);    // rerun.cpp
-void add_compare_command(CLI::App& app);  // compare.cpp
+void add_compare_command(CLI::App& app, const std::string& command_line);  // compare.cpp; for its receipt
 void add_tree_command(CLI::App& app);     // tree.cpp
+void add_audit_command(CLI::App& app);    // audit.cpp
 
 }  // namespace lumigrove

@@ -1,269 +1,271 @@
-// `lumigrove compare`: metrics of images against a reference, difference pictures, limits for automatic
-// tests.
+// lumigrove compare: methods on a scene, or images against a reference.
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "checks.h"
 #include "commands.h"
-#include "image/difference.h"
-#include "metrics/metrics.h"
+#include "comparison.h"
+#include "frame/value_text.h"
+#include "image_comparison.h"
+#include "interrupt.h"
+#include "logging.h"
+#include "output.h"
+#include "page.h"
+#include "render_job.h"
+#include "scene_options.h"
+#include "sequence.h"
+#include "setting_options.h"
+#include "summary.h"
+#include "summary_tables.h"
+#include "view_options.h"
 
 namespace lumigrove {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLimitExceeded = 3;
-
 struct CompareOptions {
-  std::string reference;
-  std::vector<std::string> images, fail_above, fail_below;
-  std::string layer, curve = "filmic", folder;
-  MetricSettings metrics;
-  bool json = false;
+  ImageComparison images;  // whose `images` are the command's words: image files, or one scene
+  std::vector<std::string> methods, budget, reference_budget;
+  std::string reference_method, seeds = "4", frames, fps = "24", time, progress = "auto";
+  std::string command;  // line of it
+  bool resume = false, force = false;
+  std::shared_ptr<SceneOptions> scene = std::make_shared<SceneOptions>();
+  std::shared_ptr<SettingOptions> settings;
+  std::shared_ptr<ViewOptions> view;
+  std::shared_ptr<LogOptions> log;
 };
 
-struct Limit {
-  MetricInfo info;
-  double value = 0;
-};
+// --- methods on a scene ------------------------------------------------------------------------------------------
 
-struct ComparedImage {
-  std::string file;
-  Comparison comparison;
-  std::vector<std::string> pictures;  // difference pictures that were written
-  std::vector<std::string> failures;  // one sentence for each limit that it does not keep
-};
-
-// --- limits
-// -------------------------------------------------------------------------------------------------------
-
-std::string metric_keys() {
-  std::string keys;
-  for (const MetricInfo& info : metrics()) keys += (keys.empty() ? "" : ", ") + std::string(info.key);
-  return keys;
+// Settings that all have are given like those of `render`, but for what a comparison decides itself.
+void check_common_settings(const SettingOptions& given) {
+  if (!given.preset.empty()) throw Error("--preset has no place in a comparison; --methods names its methods");
+  for (const auto& [key, value] : given.values)
+    if (key == "spp") throw Error(fmt::format("--spp has no place in a comparison; write --budget {}spp", value));
+  if (!given.crop_window.empty() || !given.pixel.empty())
+    throw Error("a comparison measures whole images; leave --cropwindow, --pixelbounds and --pixel out");
 }
 
-const MetricInfo& find_metric(const std::string& option, const std::string& key) {
-  for (const MetricInfo& info : metrics())
-    if (key == info.key) return info;
-  throw CLI::ValidationError(option, fmt::format("unknown metric '{}'; valid are {}", key, metric_keys()));
+bool is_of_method(const std::string& key) { return key.starts_with("direct.") || key.starts_with("indirect."); }
+
+// What all methods share; for the reference.
+SettingOptions without_methods(SettingOptions given) {
+  std::erase_if(given.assignments, [](const std::string& assignment) { return is_of_method(assignment); });
+  return given;
 }
 
-double parse_limit(const std::string& option, const std::string& text) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
-    throw CLI::ValidationError(option, fmt::format("'{}' is not a number", text));
-  return value;
-}
-
-// "flip=0.1"
-std::vector<Limit> parse_limits(const std::string& option, const std::vector<std::string>& texts) {
-  const bool above = option == "--fail-above";
-  std::vector<Limit> limits;
-  for (const std::string& text : texts) {
-    const std::size_t equals = text.find('=');
-    if (equals == std::string::npos)
-      throw CLI::ValidationError(option, fmt::format("'{}' is not of the form METRIC=VALUE", text));
-    const MetricInfo& info = find_metric(option, text.substr(0, equals));
-    if (info.lower_is_better != above)
-      throw CLI::ValidationError(
-          option, fmt::format("{} is better when it is {}; use {} {}", info.label, above ? "higher" : "lower",
-                              above ? "--fail-below" : "--fail-above", text));
-    limits.push_back({info, parse_limit(option, text.substr(equals + 1))});
+ComparedMethod make_method(const CompareOptions& options, const MethodSpec& spec, SettingOptions given) {
+  ComparedMethod method{spec, make_preset(spec.preset), {}};
+  given.preset = spec.preset;
+  // The number of bounces is for those that have any.
+  if (method.settings.indirect.transport == Transport::kNone)
+    std::erase_if(given.values, [](const auto& value) { return value.first == "indirect.max_bounces"; });
+  for (const auto& [key, value] : spec.values) given.assignments.push_back(key + "=" + value);
+  try {
+    method.settings = make_settings(given);
+    if (!options.time.empty()) set_value(method.settings, "time", options.time);
+  } catch (const Error& error) {
+    method.failure = error.what();
   }
-  return limits;
+  return method;
 }
 
-std::vector<Limit> all_limits(const CompareOptions& options) {
-  std::vector<Limit> limits = parse_limits("--fail-above", options.fail_above);
-  const std::vector<Limit> below = parse_limits("--fail-below", options.fail_below);
-  limits.insert(limits.end(), below.begin(), below.end());
-  return limits;
+std::string reference_preset() {
+  for (const PresetInfo& preset : presets())
+    if (preset.reference) return preset.name;
+  throw std::logic_error("no preset is the reference");
 }
 
-// A metric that is not a number keeps no limit.
-std::vector<std::string> broken_limits(const ComparedImage& image, const std::vector<Limit>& limits) {
-  std::vector<std::string> failures;
-  for (const Limit& limit : limits) {
-    const double value = image.comparison.value(limit.info.metric);
-    const bool keeps = limit.info.lower_is_better ? value <= limit.value : value >= limit.value;
-    if (!keeps)
-      failures.push_back(fmt::format("{}: {} {:.6g} is {} the limit {:.6g}", image.file, limit.info.label,
-                                     value, limit.info.lower_is_better ? "above" : "below", limit.value));
+bool finds_indirect(const ComparedMethod& method) {
+  return method.failure.empty() && method.settings.indirect.transport != Transport::kNone;
+}
+
+// What the methods find is what the reference must find; more of it would only cost time.
+void make_references(const CompareOptions& options, ComparisonJob& job) {
+  const bool chosen = !options.reference_method.empty();
+  for (const MethodSpec& spec : parse_methods({chosen ? options.reference_method : reference_preset()})) {
+    ComparedMethod method = make_method(options, spec, without_methods(*options.settings));
+    if (!method.failure.empty()) throw Error(fmt::format("--reference-method: {}", method.failure));
+    job.reference_methods.push_back(std::move(method));
   }
-  return failures;
+  const bool wanted = std::any_of(job.methods.begin(), job.methods.end(), finds_indirect);
+  if (!wanted && !chosen) job.reference_methods.front().settings.indirect.max_bounces = 0;
+  if (wanted && std::none_of(job.reference_methods.begin(), job.reference_methods.end(), finds_indirect))
+    throw Error(fmt::format("--reference-method {} finds direct light only, but a method that is compared finds more",
+                            options.reference_method));
 }
 
-// --- pictures
-// -----------------------------------------------------------------------------------------------------
-
-void make_folder(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!fs::is_directory(folder))
-    throw Error(fmt::format("{}: cannot be made a folder: {}", folder, error.message()));
+std::string default_folder(const std::string& scene) {
+  const std::string stem = is_builtin_scene(scene) ? scene.substr(0, scene.find('?')) : fs::path(scene).stem().string();
+  return "compare-" + stem;
 }
 
-// File names without folder and extension; repeated ones get a number.
-std::vector<std::string> unique_stems(const std::vector<std::string>& files) {
-  std::map<std::string, int> uses;
-  std::vector<std::string> stems;
-  for (const std::string& file : files) {
-    const std::string stem = fs::path(file).stem().string();
-    const int use = ++uses[stem];
-    stems.push_back(use == 1 ? stem : fmt::format("{}-{}", stem, use));
+ComparisonJob make_job(const CompareOptions& options) {
+  if (options.images.images.size() != 1) throw Error("--methods compares methods on one scene; name one");
+  check_common_settings(*options.settings);
+  ComparisonJob job;
+  options.scene->name = options.images.images.front();
+  job.scene = options.scene->full_name();
+  job.environment = options.scene->environment;
+  for (const MethodSpec& spec : parse_methods(options.methods))
+    job.methods.push_back(make_method(options, spec, *options.settings));
+  job.budget = parse_budget("--budget", options.budget);
+  if (!(job.budget.seconds > 0) && job.budget.spp < 1)
+    throw Error("a comparison needs a --budget: a time or a number of samples, 10s or 64spp");
+  job.seeds = static_cast<int>(parse_integer("--seeds", options.seeds, {1, 1000}));
+  job.reference_file = options.images.reference;
+  job.reference_budget = parse_budget("--reference-budget", options.reference_budget);
+  if (job.reference_file.empty()) make_references(options, job);
+  job.layer = options.images.layer;
+  if (!options.frames.empty()) {
+    job.frames = parse_frames(options.frames);
+    job.fps = parse_double("--fps", options.fps, {0, 1e6, true});
   }
-  return stems;
+  job.view = *options.view;
+  job.metrics = options.images.metrics;
+  job.metrics.tone.curve = tone_curve_from_name(options.images.curve);
+  job.tone = options.images.curve;
+  job.folder = options.images.folder.empty() ? default_folder(job.scene) : options.images.folder;
+  job.resume = options.resume;
+  job.force = options.force;
+  job.command = options.command;
+  job.progress = options.log->quiet ? ProgressStyle::kSilent : progress_style(options.progress);
+  return job;
 }
 
-std::vector<std::string> write_pictures(const RgbImage& reference, const RgbImage& test,
-                                        const Comparison& comparison, const ToneMap& tone,
-                                        const fs::path& base) {
-  std::vector<std::string> files;
-  const auto write = [&](const char* kind, const std::vector<float>& picture) {
-    files.push_back(fmt::format("{}-{}.png", base.string(), kind));
-    write_picture(picture, test.width, test.height, files.back());
-  };
-  write("signed", signed_difference(reference, test));
-  write("absolute", absolute_difference(reference, test, tone));
-  write("flip", heat_map(comparison.flip_map));
-  return files;
+// A method that cannot be rendered at all is a slip of the command line unless others remain.
+void check_methods(const ComparisonJob& job) {
+  const auto fails = [](const ComparedMethod& method) { return !method.failure.empty(); };
+  if (std::all_of(job.methods.begin(), job.methods.end(), fails)) throw Error(job.methods.front().failure);
 }
 
-// --- report
-// -------------------------------------------------------------------------------------------------------
-
-std::string layer_name(const CompareOptions& options) {
-  return options.layer.empty() ? "beauty" : options.layer;
-}
-
-void print_table(const CompareOptions& options, const RgbImage& reference,
-                 const std::vector<ComparedImage>& images) {
-  fmt::print("reference {} ({}x{}, {}); tone curve {}, exposure {:+g} EV, {:.4g} pixels per degree\n\n",
-             options.reference, reference.width, reference.height, layer_name(options), options.curve,
-             options.metrics.tone.exposure_ev, options.metrics.pixels_per_degree);
-  std::size_t width = 5;
-  for (const ComparedImage& image : images) width = std::max(width, image.file.size());
-  fmt::print("{:<{}}", "image", width);
-  for (const MetricInfo& info : metrics()) fmt::print("  {:>10}", info.label);
-  fmt::print("\n");
-  for (const ComparedImage& image : images) {
-    fmt::print("{:<{}}", image.file, width);
-    for (const MetricInfo& info : metrics()) {
-      const double value = image.comparison.value(info.metric);
-      fmt::print("  {:>10}", std::isnan(value) ? "undefined" : fmt::format("{:.5g}", value));
-    }
-    fmt::print("\n");
+void print_results(const CompareOptions& options, const ComparisonJob& job, const Results& results) {
+  if (options.images.json) {
+    nlohmann::ordered_json json = {{"folder", job.folder.string()}, {"complete", results.complete}};
+    for (const Budget budget : kBudgets) json[budget_key(budget)] = to_json(summary_table(results, budget));
+    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    return;
   }
-  fmt::print("\n");
-  for (const MetricInfo& info : metrics()) fmt::print("{:<6}  {}\n", info.label, info.formula);
-  for (const ComparedImage& image : images)
-    for (const std::string& picture : image.pictures) fmt::print("wrote {}\n", picture);
+  if (options.log->quiet) return;
+  for (const Budget budget : kBudgets) fmt::print("{}\n", to_text(summary_table(results, budget)));
+  fmt::print("{}\n", to_text(cost_table(results)));
+  for (const std::string& sentence : cautions(results)) fmt::print("{}\n", sentence);
+  fmt::print("wrote {}\n", (job.folder / "report.html").string());
 }
 
-nlohmann::ordered_json to_json(const ComparedImage& image) {
-  nlohmann::ordered_json json = {{"file", image.file}};
-  for (const MetricInfo& info : metrics())
-    json[info.key] = image.comparison.value(info.metric);  // NaN becomes null
-  json["pictures"] = image.pictures;
-  json["failures"] = image.failures;
-  return json;
-}
-
-void print_json(const CompareOptions& options, const RgbImage& reference,
-                const std::vector<ComparedImage>& images) {
-  nlohmann::ordered_json json = {{"reference", options.reference},
-                                 {"width", reference.width},
-                                 {"height", reference.height},
-                                 {"layer", layer_name(options)},
-                                 {"tone", options.curve},
-                                 {"exposure_ev", options.metrics.tone.exposure_ev},
-                                 {"pixels_per_degree", options.metrics.pixels_per_degree}};
-  for (const MetricInfo& info : metrics()) json["formulas"][info.key] = info.formula;
-  json["images"] = nlohmann::ordered_json::array();
-  for (const ComparedImage& image : images) json["images"].push_back(to_json(image));
-  // File names need not be UTF-8, JSON strings must be.
-  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
-}
-
-// --- the command
-// --------------------------------------------------------------------------------------------------
-
-RgbImage load(const CompareOptions& options, const std::string& file) {
-  return rgb_of(read_image(file), options.layer, file);
-}
-
-std::vector<ComparedImage> compare_all(const CompareOptions& options, const RgbImage& reference,
-                                       const std::vector<Limit>& limits) {
-  const std::vector<std::string> stems = unique_stems(options.images);
-  std::vector<ComparedImage> images;
-  for (std::size_t i = 0; i < options.images.size(); ++i) {
-    const RgbImage test = load(options, options.images[i]);
-    ComparedImage image{options.images[i], compare_images(reference, test, options.metrics), {}, {}};
-    if (!options.folder.empty())
-      image.pictures = write_pictures(reference, test, image.comparison, options.metrics.tone,
-                                      fs::path(options.folder) / stems[i]);
-    image.comparison.flip_map.clear();
-    image.failures = broken_limits(image, limits);
-    images.push_back(std::move(image));
-  }
-  return images;
-}
-
-void run(CompareOptions& options) {
-  const std::vector<Limit> limits = all_limits(options);
-  options.metrics.tone.curve = tone_curve_from_name(options.curve);
-  if (!options.folder.empty()) make_folder(options.folder);
-  const RgbImage reference = load(options, options.reference);
-  const std::vector<ComparedImage> images = compare_all(options, reference, limits);
-  options.json ? print_json(options, reference, images) : print_table(options, reference, images);
+void compare_methods(CompareOptions& options) {
+  start_logging(*options.log);
+  const ComparisonJob job = make_job(options);
+  check_methods(job);
+  const InterruptGuard guard;
+  const Results results = run_comparison(job, guard);
+  print_results(options, job, results);
   std::fflush(stdout);
-  bool failed = false;
-  for (const ComparedImage& image : images)
-    for (const std::string& failure : image.failures) {
-      fmt::print(stderr, "lumigrove: {}\n", failure);
-      failed = true;
-    }
-  if (failed) throw ExitCode{kLimitExceeded};
+  if (guard.interrupted()) throw ExitCode{guard.exit_status()};
 }
 
-void add_limits(CLI::App& command, CompareOptions& options) {
+// --- the command ---------------------------------------------------------------------------------------------------
+
+bool is_image_file(const std::string& name) {
+  const std::string extension = lower_extension(name);
+  return std::find(kImageExtensions.begin(), kImageExtensions.end(), extension) != kImageExtensions.end();
+}
+
+// Without --methods it is about image files.
+void compare_images(CompareOptions& options) {
+  const std::vector<std::string>& words = options.images.images;
+  if (words.size() == 1 && !is_image_file(words.front()) && (is_builtin_scene(words.front()) || options.images.reference.empty()))
+    throw Error(fmt::format("{} is not an image; --methods tree,pool compares methods on a scene (see `lumigrove list methods`)",
+                            words.front()));
+  if (options.images.reference.empty()) throw CLI::RequiredError("-r,--reference");
+  const auto refuse = [&](bool given, const char* option) {
+    if (given) throw Error(fmt::format("{} is for comparing methods; give --methods too", option));
+  };
+  refuse(!options.budget.empty(), "--budget");
+  refuse(!options.frames.empty(), "--frames");
+  refuse(options.resume, "--resume");
+  refuse(!options.reference_method.empty(), "--reference-method");
+  refuse(!options.reference_budget.empty(), "--reference-budget");
+  compare_image_files(options.images);
+}
+
+void run(CompareOptions& options) { options.methods.empty() ? compare_images(options) : compare_methods(options); }
+
+constexpr const char* kMethods = "Methods";
+
+void add_method_options(CLI::App& command, const std::shared_ptr<CompareOptions>& options) {
+  const auto list = [&](const char* name, std::vector<std::string>& value, const char* type, const char* description) {
+    command.add_option(name, value, description)->allow_extra_args(false)->type_name(type)->check(not_empty())->group(kMethods);
+  };
+  const auto text = [&](const char* name, std::string& value, const char* type, const char* description) {
+    return command.add_option(name, value, description)->type_name(type)->check(not_empty())->group(kMethods);
+  };
+  list("--methods", options->methods, "A,B,...",
+       "Methods of `list methods` to compare on the scene; tree:direct.spp=4 is one with another setting, four=tree:direct.spp=4 calls it so");
+  list("--budget", options->budget, "10s|64spp",
+       "Time and number of samples that every method has with every seed; of one alone the other follows");
+  text("--seeds", options->seeds, "N", "Runs of every method, for 95 % intervals (default 4)");
+  text("--reference-method", options->reference_method, "NAME[,NAME]",
+       "What renders the reference (default path); a second one without indirect light that of direct light");
+  list("--reference-budget", options->reference_budget, "60s|512spp",
+       "Of the reference (default: as long as all methods together)");
+  auto* frames = text("--frames", options->frames, "A-BxS", "Frames of a sequence to compare, each with its reference");
+  text("--fps", options->fps, "N", "Frames a second of --frames (default 24)")->needs(frames);
+  text("--time", options->time, "SECONDS", "Moment of the animation (s, default 0)")->excludes(frames);
+  command.add_flag("--resume", options->resume, "Go on with the comparison in the folder, given the same options; more --seeds add to it")
+      ->group(kMethods);
+  command.add_flag("--force", options->force, "Replace the comparison in the folder")->group(kMethods);
+}
+
+void add_image_options(CLI::App& command, ImageComparison& images) {
+  command.add_option("-r,--reference", images.reference, "The reference image; methods: instead of rendering one")
+      ->check(not_empty())
+      ->type_name("FILE");
+  command.add_option("SCENE_OR_IMAGES,-t,--test", images.images, "Images to measure; with --methods, one scene")
+      ->required()
+      ->type_name("NAME");
   command
-      .add_option("--fail-above", options.fail_above,
+      .add_option("--layer", images.layer,
+                  "Layer with R, G and B to compare, such as direct (default beauty; methods: what they find)")
+      ->type_name("NAME");
+  command
+      .add_option("-o,--output", images.folder,
+                  "Folder for pictures of the difference: NAME-signed.png (blue darker, red brighter), "
+                  "NAME-absolute.png, NAME-flip.png; methods: for everything (default compare-SCENE)")
+      ->check(not_empty())
+      ->type_name("FOLDER");
+  command.add_flag("--json", images.json, "Print JSON instead of a table");
+}
+
+void add_limits(CLI::App& command, ImageComparison& images) {
+  command
+      .add_option("--fail-above", images.fail_above,
                   "Exit with status 3 when rmse, relmse or flip of an image is above VALUE; may be repeated")
       ->allow_extra_args(false)
       ->type_name("METRIC=VALUE");
   command
-      .add_option("--fail-below", options.fail_below,
+      .add_option("--fail-below", images.fail_below,
                   "Exit with status 3 when ssim of an image is below VALUE; may be repeated")
       ->allow_extra_args(false)
       ->type_name("METRIC=VALUE");
 }
 
-void add_tone(CLI::App& command, CompareOptions& options) {
+void add_tone(CLI::App& command, ImageComparison& images) {
   command
-      .add_option("--exposure", options.metrics.tone.exposure_ev,
+      .add_option("--exposure", images.metrics.tone.exposure_ev,
                   "Exposure before SSIM, FLIP and pictures (EV, default 0; +1 doubles)")
       ->type_name("EV")
       ->check(number_in(-100, 100));
   command
-      .add_option("--tone,--curve", options.curve,
-                  "Tone curve before SSIM, FLIP and pictures (default filmic)")
+      .add_option("--tone,--curve", images.curve, "Tone curve before SSIM, FLIP and pictures (default filmic)")
       ->check(CLI::IsMember({"filmic", "srgb"}));
   command
-      .add_option("--pixels-per-degree", options.metrics.pixels_per_degree,
+      .add_option("--pixels-per-degree", images.metrics.pixels_per_degree,
                   "Pixels in a degree of the viewer's visual angle, for FLIP (default 67.02)")
       ->type_name("N")
       ->check(number_in(1, 1000));
@@ -271,33 +273,24 @@ void add_tone(CLI::App& command, CompareOptions& options) {
 
 }  // namespace
 
-void add_compare_command(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("compare", "Measure images against a reference: RMSE, relMSE, SSIM, FLIP");
+void add_compare_command(CLI::App& app, const std::string& command_line) {
+  CLI::App* command = app.add_subcommand(
+      "compare", "Compare methods on a scene at equal time and equal samples, or images with a reference");
   auto options = std::make_shared<CompareOptions>();
-  command->add_option("-r,--reference", options->reference, "The reference image")
-      ->required()
-      ->type_name("FILE");
-  command->add_option("IMAGES,-t,--test", options->images, "Images of the same size to measure")
-      ->required()
-      ->type_name("FILE");
-  command
-      ->add_option("--layer", options->layer,
-                   "Layer with R, G and B to compare, such as direct (default beauty)")
-      ->type_name("NAME");
-  command
-      ->add_option("-o,--output", options->folder,
-                   "Folder for pictures of the difference: NAME-signed.png (blue darker, red brighter), "
-                   "NAME-absolute.png, NAME-flip.png")
-      ->check(not_empty())
-      ->type_name("FOLDER");
-  command->add_flag("--json", options->json, "Print JSON instead of a table");
-  add_tone(*command, *options);
-  add_limits(*command, *options);
+  options->command = command_line;
+  add_image_options(*command, options->images);
+  add_tone(*command, options->images);
+  add_limits(*command, options->images);
+  add_method_options(*command, options);
+  add_scene_parameters(*command, options->scene);
+  options->settings = add_setting_options(*command, "--threads,--nthreads");
+  options->view = add_view_options(*command);
+  add_progress_option(*command, options->progress);
+  options->log = add_log_options(*command);
   command->footer(
       "RMSE and relMSE are taken from linear RGB. Integer images are decoded from sRGB first; --tone srgb "
-      "shows them "
-      "as they are.\nExit status: 0 every limit kept, 1 error, 2 wrong usage, 3 a limit broken.");
+      "shows them as they are.\nExit status: 0 done, every limit kept, 1 error, 2 wrong usage, 3 a limit broken, 130 "
+      "interrupted: the report then holds what was measured.");
   command->callback([options] { run(*options); });
 }
 

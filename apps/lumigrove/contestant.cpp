@@ -91,10 +91,13 @@ double Contestant::rays() const {
 }
 
 RgbImage Contestant::image(const std::string& light) const {
-  if (light == kAllLight)
-    return rgb_image(*film_, [](const FilmPixel& p) { return p.direct + p.indirect + p.emission; });
-  if (light == kDirectLight) return rgb_image(*film_, [](const FilmPixel& p) { return p.direct + p.emission; });
+  if (light == kAllLight) return rgb_image(*film_, [](const FilmPixel& p) { return p.direct + p.indirect; });
+  if (light == kDirectLight) return part(&FilmPixel::direct);
   return rgb_of(develop(*film_, spp_), light, settings_.preset);
+}
+
+RgbImage Contestant::part(vec3 FilmPixel::*light) const {
+  return rgb_image(*film_, [=](const FilmPixel& p) { return p.*light; });
 }
 
 void Contestant::describe(Run& run) const {

@@ -12,9 +12,10 @@
 
 namespace lumigrove {
 
-// What images are compared by.
-inline constexpr const char* kAllLight = "all light";        // the beauty
-inline constexpr const char* kDirectLight = "direct light";  // direct and emission; all that a method without transport finds
+// What methods are measured by: light that surfaces reflect. Emission that the camera sees directly no method samples; its
+// noise along the edges of bright lights is the same for all and would drown their differences.
+inline constexpr const char* kAllLight = "all light";        // direct and indirect
+inline constexpr const char* kDirectLight = "direct light";  // all that a method without transport finds
 // or the name of a layer.
 
 class Contestant {
@@ -29,11 +30,13 @@ class Contestant {
   void begin(std::uint32_t seed);
   void sample();  // one more camera sample of the whole image
 
+  std::uint64_t emitters() const { return world_->lights.view().emitters.size(); }
   int spp() const { return spp_; }
   double seconds() const { return build_s_ + samples_s_; }
   double median_sample_s() const;
   double rays() const;
   RgbImage image(const std::string& light) const;  // the mean so far; spp() > 0
+  RgbImage part(vec3 FilmPixel::*light) const;     // direct, indirect or emission
   const Settings& settings() const { return settings_; }
 
   // Times, rays and sizes since `begin`.

@@ -51,6 +51,12 @@ MethodSpec parse_method(const std::string& text) {
   if (parts.front().empty())
     throw Error(fmt::format("'{}' names no method; write them as tree,rtslc or tree:direct.spp=4", text));
   MethodSpec spec{text, parts.front(), {}};
+  if (const std::size_t equals = spec.preset.find('='); equals != std::string::npos) {
+    spec.name = spec.preset.substr(0, equals);
+    spec.preset = spec.preset.substr(equals + 1);
+    if (spec.name.empty() || spec.preset.empty())
+      throw Error(fmt::format("method '{}': a name of its own is written NAME=METHOD", text));
+  }
   for (std::size_t i = 1; i < parts.size(); ++i) {
     const std::size_t equals = parts[i].find('=');
     if (equals == std::string::npos)

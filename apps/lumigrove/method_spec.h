@@ -8,9 +8,10 @@
 
 namespace lumigrove {
 
-// "tree" or "tree:direct.spp=4:direct.width=2": a preset and what is set over it.
+// "tree" or "tree:direct.spp=4:direct.width=2": a preset and what is set over it; "binary=tree:direct.width=2" with a name
+// of its own.
 struct MethodSpec {
-  std::string name;  // as it was written
+  std::string name;  // its own, or as it was written
   std::string preset;
   SettingValues values;
 };

@@ -82,4 +82,11 @@ void require_writable(const std::string& name, const std::vector<std::string>& e
   require_creatable(file);
 }
 
+void make_folder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!std::filesystem::is_directory(folder))
+    throw Error(fmt::format("{}: cannot be made a folder: {}", folder, error.message()));
+}
+
 }  // namespace lumigrove

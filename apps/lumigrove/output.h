@@ -35,4 +35,7 @@ void require_distinct(const std::vector<std::string>& files);
 // is a regular file if it exists already.
 void require_writable(const std::string& file, const std::vector<std::string>& extensions = kImageExtensions);
 
+// Makes the folder and those above it where they are missing. Throws Error.
+void make_folder(const std::string& folder);
+
 }  // namespace lumigrove

@@ -21,14 +21,7 @@ std::string SceneOptions::full_name() const {
   return result;
 }
 
-std::shared_ptr<SceneOptions> add_scene_options(CLI::App& command) {
-  auto options = std::make_shared<SceneOptions>();
-  command
-      .add_option(
-          "SCENE", options->name,
-          "A file (.gltf, .glb, .obj, .ply, .fbx) or a built-in scene of `list scenes`, with parameters: "
-          "night-city?lights=50000&seed=3")
-      ->required();
+void add_scene_parameters(CLI::App& command, const std::shared_ptr<SceneOptions>& options) {
   command.add_option("-D", options->definitions, "Parameter of a built-in scene; may be repeated")
       ->allow_extra_args(false)
       ->type_name("KEY=VALUE");
@@ -37,6 +30,17 @@ std::shared_ptr<SceneOptions> add_scene_options(CLI::App& command) {
                   "Light from infinitely far away: constant radiance r,g,b or an equirectangular image")
       ->check(not_empty())
       ->type_name("R,G,B|FILE");
+}
+
+std::shared_ptr<SceneOptions> add_scene_options(CLI::App& command) {
+  auto options = std::make_shared<SceneOptions>();
+  command
+      .add_option(
+          "SCENE", options->name,
+          "A file (.gltf, .glb, .obj, .ply, .fbx) or a built-in scene of `list scenes`, with parameters: "
+          "night-city?lights=50000&seed=3")
+      ->required();
+  add_scene_parameters(command, options);
   return options;
 }
 

@@ -20,4 +20,7 @@ struct SceneOptions {
 
 std::shared_ptr<SceneOptions> add_scene_options(CLI::App& command);
 
+// -D and --environment alone, for a command whose SCENE is not all that may stand there.
+void add_scene_parameters(CLI::App& command, const std::shared_ptr<SceneOptions>& options);
+
 }  // namespace lumigrove

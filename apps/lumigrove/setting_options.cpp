@@ -142,7 +142,7 @@ CLI::Option* add_list_option(CLI::App& command, const std::string& name, int cou
       ->type_name(type_name);
 }
 
-std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command) {
+std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command, const std::string& threads) {
   auto options = std::make_shared<SettingOptions>();
   command.add_option("--preset,--method", options->preset, "Method, one of `list methods` (default tree)")
       ->check(not_empty())
@@ -161,7 +161,7 @@ std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command) {
   add_value(command, options, "--spp", "spp");
   add_size_options(command, options);
   add_value(command, options, "--seed", "seed");
-  add_value(command, options, "-t,--threads,--nthreads", "threads");
+  add_value(command, options, threads, "threads");
   add_value(command, options, "--max-bounces", "indirect.max_bounces")
       ->description("Most indirect bounces of a path or a virtual point light, 0 = direct light only (default of the method)");
   add_value(command, options, "--camera", "camera");
@@ -174,6 +174,18 @@ std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command) {
            "All camera samples go through the pixel's centre");
   add_crop_options(command, options);
   return options;
+}
+
+bool gives(const SettingOptions& options, const std::string& key) {
+  const auto is_key = [&](const auto& pair) { return pair.first == key; };
+  const auto assigns = [&](const std::string& text) { return text.starts_with(key + '='); };
+  if (std::any_of(options.values.begin(), options.values.end(), is_key)) return true;
+  if (std::any_of(options.assignments.begin(), options.assignments.end(), assigns)) return true;
+  for (const std::string& file : options.files) {
+    const SettingValues values = read_settings_file(file);
+    if (std::any_of(values.begin(), values.end(), is_key)) return true;
+  }
+  return false;
 }
 
 Settings make_settings(const SettingOptions& options) {

@@ -21,10 +21,15 @@ struct SettingOptions {
   std::vector<std::string> pixel;        // x y; empty: not given
 };
 
-std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command);
+// `threads`: names of that option.
+std::shared_ptr<SettingOptions> add_setting_options(CLI::App& command,
+                                                    const std::string& threads = "-t,--threads,--nthreads");
 
 // Preset, then settings files, then --set, then the options of their own; checked. Throws Error.
 Settings make_settings(const SettingOptions& options);
+
+// Is `key` given by anything but the method?
+bool gives(const SettingOptions& options, const std::string& key);
 
 // An option of exactly `count` values, also as one word with `separator` between them.
 using ListFunction = std::function<void(const std::vector<std::string>&)>;

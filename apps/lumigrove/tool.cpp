@@ -13,6 +13,7 @@
 #include "base/nearest.h"
 #include "commands.h"
 #include "frame/receipt.h"
+#include "shell.h"
 
 namespace lumigrove {
 namespace {
@@ -83,21 +84,29 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   return fail(kWrongUsage, fmt::format("{} (see `{} --help`)", sentence, full_name(command)));
 }
 
-void add_commands(CLI::App& app) {
+// As one line that a shell takes apart in the same way.
+std::string command_line(int argc, char** argv) {
+  std::string line = "lumigrove";
+  for (int i = 1; i < argc; ++i) line += fmt::format(" {}", shell_quoted(argv[i]));
+  return line;
+}
+
+void add_commands(CLI::App& app, const std::string& line) {
   app.set_version_flag("--version", "lumigrove " + version_text());
   app.require_subcommand(1);
   app.get_formatter()->column_width(34);
   add_render_command(app);
   add_rerun_command(app);
-  add_compare_command(app);
+  add_compare_command(app, line);
   add_tree_command(app);
+  add_audit_command(app);
   add_scene_command(app);
   add_list_command(app);
 }
 
 int parse_and_run(int argc, char** argv) {
   CLI::App app("Renders scenes lit by very many lights.", "lumigrove");
-  add_commands(app);
+  add_commands(app, command_line(argc, argv));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -38,19 +38,6 @@ struct TreeOptions {
   bool prints_statistics() const { return !explains_pixel() && overlay.empty() && exports.empty(); }
 };
 
-// Is `key` given by anything but the method?
-bool gives(const SettingOptions& options, const std::string& key) {
-  const auto is_key = [&](const auto& pair) { return pair.first == key; };
-  const auto assigns = [&](const std::string& text) { return text.starts_with(key + '='); };
-  if (std::any_of(options.values.begin(), options.values.end(), is_key)) return true;
-  if (std::any_of(options.assignments.begin(), options.assignments.end(), assigns)) return true;
-  for (const std::string& file : options.files) {
-    const SettingValues values = read_settings_file(file);
-    if (std::any_of(values.begin(), values.end(), is_key)) return true;
-  }
-  return false;
-}
-
 Settings make_tree_settings(const TreeOptions& options) {
   SettingOptions given = *options.settings;
   if (given.preset.empty() && !gives(given, "preset")) given.preset = "sst";

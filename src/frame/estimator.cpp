@@ -69,10 +69,12 @@ EstimatorLabel estimator_label(const Settings& settings) {
   return label;
 }
 
+const char* bias_name(Bias kind) {
+  return kind == Bias::kUnbiased ? "unbiased" : kind == Bias::kConsistent ? "consistent" : "biased";
+}
+
 std::string estimator_text(const EstimatorLabel& label) {
-  const char* kind = label.kind == Bias::kUnbiased     ? "unbiased"
-                     : label.kind == Bias::kConsistent ? "consistent"
-                                                       : "biased";
+  const char* kind = bias_name(label.kind);
   return label.reason.empty() ? kind : fmt::format("{}: {}", kind, label.reason);
 }
 

@@ -23,6 +23,7 @@ struct EstimatorLabel {
 // For any settings that pass `check`.
 EstimatorLabel estimator_label(const Settings& settings);
 
+const char* bias_name(Bias kind);  // "unbiased"
 // "unbiased", or with its reason: "biased: clamp leaves out light near VPLs".
 std::string estimator_text(const EstimatorLabel& label);
 

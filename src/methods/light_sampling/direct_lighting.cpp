@@ -24,6 +24,10 @@ SampleNumbers numbers_of_sample(std::uint32_t seed, std::uint32_t dimension, std
 
 void trace_shadow_rays(const DirectLighting& lighting, DirectBuffers& buffers) {
   const ScopedTimer timer(buffers.trace_ms);
+  if (!lighting.tracer) {
+    std::fill(buffers.occluded.begin(), buffers.occluded.end(), std::uint8_t{0});
+    return;
+  }
   lighting.tracer->occluded(buffers.shadow, buffers.occluded, Coherence::kIncoherent);
   for (const Ray& ray : buffers.shadow) buffers.rays += ray.tmax >= ray.tmin ? 1 : 0;
 }

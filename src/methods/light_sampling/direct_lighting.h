@@ -18,7 +18,7 @@ namespace lumigrove {
 // How lights are chosen at every surface of a frame. Plain data: copy freely.
 struct DirectLighting {
   LightSampler sampler;
-  const Tracer* tracer = nullptr;
+  const Tracer* tracer = nullptr;  // null: nothing is in the way of any light
   Rng rng;           // seed and frame; the pixel is set for each surface
   int spp = 1;       // light samples a surface, averaged
   bool all = false;  // instead: spp samples of every light, summed (the oracle)

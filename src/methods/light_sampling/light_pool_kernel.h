@@ -214,6 +214,17 @@ struct AreaCut {
   int count = 0;
 };
 
+LUMI_HD inline WalkRegion region_of_area(const AreaBounds& bounds) {
+  return {bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
+}
+
+LUMI_HD inline void cut_of_region(const LightTreeView& tree, const WalkRegion& region, int size, AreaCut& cut) {
+  with_width(tree.width, [&](auto w) {
+    const float floor2 = glm::max(glm::max(tree.inside2, tree.floor2), length_squared(region.half));
+    select_cut(CutOfRegion<w>{tree, region, floor2}, size, cut);
+  });
+}
+
 // A light below each node of the area's cut for every pool.
 struct PoolKernel {
   LightSampler sampler;
@@ -239,12 +250,9 @@ struct PoolKernel {
     const LightTreeView& tree = sampler.tree;
     for (int j = 0; j < count; ++j) chosen[j] = {};
     if (!bounds.present || tree.count == 0) return;
-    const WalkRegion region{bounds.box.centre(), 0.5f * (bounds.box.hi - bounds.box.lo), bounds.normal, bounds.spread};
+    const WalkRegion region = region_of_area(bounds);
     AreaCut cut;
-    with_width(tree.width, [&](auto w) {
-      const float floor2 = glm::max(glm::max(tree.inside2, tree.floor2), length_squared(region.half));
-      select_cut(CutOfRegion<w>{tree, region, floor2}, lookup.size, cut);
-    });
+    cut_of_region(tree, region, lookup.size, cut);
     const int many = lookup.pools_per_area();
     SortedStart starts[kMaxPool];
     for (int k = 0; k < cut.count; ++k)

@@ -262,24 +262,41 @@ LUMI_HD inline ChosenGroup choose_group_at_infinity(const LightSampler& sampler,
   return {LightGroup::kEnvironment, 1 - share, 0};
 }
 
-// Among the directional lights in front of the surface, by irradiance times cosine.
-LUMI_HD inline LightSample sample_directional(const LightSampler& sampler, const Surface& surface,
-                                              const ChosenGroup& group) {
-  const auto weight_of = [&](const DirectionalView& light) {
-    return luminance(light.irradiance) * glm::max(0.0f, -glm::dot(light.direction, surface.normal));
-  };
+LUMI_HD inline float directional_weight(const DirectionalView& light, const Surface& surface) {
+  return luminance(light.irradiance) * glm::max(0.0f, -glm::dot(light.direction, surface.normal));
+}
+LUMI_HD inline float sum_of_directional_weights(const LightSampler& sampler, const Surface& surface) {
   float total = 0;
-  for (const DirectionalView& light : sampler.lights.directional) total += weight_of(light);
-  float rest = group.r * total;
-  LightSample sample;
-  for (const DirectionalView& light : sampler.lights.directional) {
-    const float weight = weight_of(light);
+  for (const DirectionalView& light : sampler.lights.directional) total += directional_weight(light, surface);
+  return total;
+}
+
+// One of the directional lights in front of the surface, by irradiance times cosine; kNoEmitter if there is none.
+LUMI_HD inline std::uint32_t choose_directional(const LightSampler& sampler, const Surface& surface, float r) {
+  float rest = r * sum_of_directional_weights(sampler, surface);
+  std::uint32_t chosen = kNoEmitter;
+  for (std::uint32_t i = 0; i < sampler.lights.directional.size(); ++i) {
+    const float weight = directional_weight(sampler.lights.directional[i], surface);
     if (!(weight > 0)) continue;
-    sample = directional_sample(light, group.probability * weight / total);
+    chosen = i;
     if (rest < weight) break;
     rest -= weight;
   }
-  return sample;
+  return chosen;
+}
+
+// Probability with which choose_directional returns light number `index`.
+LUMI_HD inline float pdf_directional(const LightSampler& sampler, const Surface& surface, std::uint32_t index) {
+  const float total = sum_of_directional_weights(sampler, surface);
+  return total > 0 ? directional_weight(sampler.lights.directional[index], surface) / total : 0.0f;
+}
+
+LUMI_HD inline LightSample sample_directional(const LightSampler& sampler, const Surface& surface,
+                                              const ChosenGroup& group) {
+  const std::uint32_t chosen = choose_directional(sampler, surface, group.r);
+  if (chosen == kNoEmitter) return {};
+  return directional_sample(sampler.lights.directional[chosen],
+                            group.probability * pdf_directional(sampler, surface, chosen));
 }
 
 // The light of a group. `chosen` is choose_emitter's answer for group.r, used by local lights only.

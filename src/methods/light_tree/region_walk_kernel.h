@@ -145,4 +145,32 @@ LUMI_HD inline void sample_light_tree_sorted(const LightTreeView& tree, const Wa
   });
 }
 
+// Probability with which a walk from `start` ends at leaf number `leaf`; 0 for one that is not below.
+template <int W>
+LUMI_HD inline float pdf_leaf_in_region(const LightTreeView& tree, const WalkRegion& region, Subtree start,
+                                        std::uint32_t leaf) {
+  std::uint32_t span = 1;  // leaves below a child of the current level
+  for (int level = start.level + 1; level < tree.levels; ++level) span *= W;
+  const std::uint32_t lane = leaf / span % W;
+  if (leaf / span / W != start.node || lane < start.first || lane >= start.first + start.children) return 0;
+  float pdf = 1;
+  for (int level = start.level; level < tree.levels; ++level, span /= W) {
+    const LightNode<W>& node = tree.level<W>(level)[leaf / span / W];
+    const Weighing weighing = weighing_of_level(tree, level, tree.weights);
+    const ChildWeights<W> children =
+        level == start.level ? weigh_children_of_region<W>(node, start.first, start.children, weighing, region)
+                             : weigh_children_of_region<W>(node, 0, W, weighing, region);
+    if (!(children.total > 0)) return 0;
+    alignas(64) float weights[W];
+    store_lanes<W>(children.weight, weights);
+    pdf *= weights[leaf / span % W] / children.total;
+  }
+  return pdf;
+}
+LUMI_HD inline float pdf_leaf_in_region(const LightTreeView& tree, const WalkRegion& region, Subtree start,
+                                        std::uint32_t leaf) {
+  if (tree.count == 0) return 0;
+  return with_width(tree.width, [&](auto w) { return pdf_leaf_in_region<w>(tree, region, start, leaf); });
+}
+
 }  // namespace lumigrove

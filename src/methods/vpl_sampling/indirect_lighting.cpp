@@ -31,11 +31,13 @@ void add_part(const Batch& batch, const VplSampler& sampler, CorrectionPart part
                                part, batch.surfaces, batch.pixels, b.shadow, b.contribution, corrected, traces},
            kLaunchGrain / kSurfacesPerCall);
   }
-  {
+  if (batch.lighting.tracer) {
     const ScopedTimer timer(b.trace_ms);
     batch.lighting.tracer->occluded(b.shadow, b.occluded, Coherence::kIncoherent);
+    for (const Ray& ray : b.shadow) b.rays += ray.tmax >= ray.tmin ? 1 : 0;
+  } else {
+    std::fill(b.occluded.begin(), b.occluded.end(), std::uint8_t{0});
   }
-  for (const Ray& ray : b.shadow) b.rays += ray.tmax >= ray.tmin ? 1 : 0;
   launch(batch.count(), AddUnoccludedKernel{b.contribution, b.occluded, batch.sum});
 }
 
