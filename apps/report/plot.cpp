@@ -11,8 +11,6 @@
 namespace lumigrove {
 namespace {
 
-bool is_number(double value) { return value - value == 0; }
-
 // --- looks ---------------------------------------------------------------------------------------------------------
 
 constexpr int kStyles = 10;
