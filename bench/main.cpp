@@ -66,7 +66,7 @@ void write_json(const std::string& file, const Options& options, const nlohmann:
                                        {"runs", options.runs},
                                        {"results", results}};
   const std::string text = json.dump(2) + "\n";
-  write_file_atomically(file, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  write_text_atomically(file, text);
 }
 
 struct Command {

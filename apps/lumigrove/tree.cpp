@@ -136,7 +136,7 @@ constexpr std::size_t kMostBoxes = 2000;
 void export_tree(const std::string& file, const World& world, bool quiet) {
   if (lower_extension(file) == ".json") {
     const std::string text = tree_json(world);
-    write_file_atomically(file, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+    write_text_atomically(file, text);
     const std::uint32_t lights = world.substitutes.view().count;
     if (!quiet) fmt::print("wrote {} ({} inner nodes, {} VPLs)\n", file, lights - 1, lights);
     return;

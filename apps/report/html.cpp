@@ -8,8 +8,6 @@
 namespace lumigrove {
 namespace {
 
-bool is_number(double value) { return value - value == 0; }
-
 // With separators between thousands.
 std::string whole_text(double value) {
   std::string text = fmt::format("{:.0f}", std::abs(value));

@@ -14,14 +14,8 @@
 namespace lumigrove {
 namespace {
 
-bool is_number(double value) { return value - value == 0; }
-
 std::string plural(std::size_t count, const char* word) {
   return fmt::format("{} {}{}", count, word, count == 1 ? "" : "s");
-}
-
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  write_file_atomically(file, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
 // --- head of the report --------------------------------------------------------------------------------------------
@@ -223,7 +217,7 @@ std::string html_page(const std::string& title, const std::string& body) {
 
 void write_table_page(const std::filesystem::path& file, const std::string& title, const std::string& introduction,
                       const Table& table) {
-  write_text(file, html_page(title, "<p>" + escape_html(introduction) + "</p>\n" + to_html(table)));
+  write_text_atomically(file, html_page(title, "<p>" + escape_html(introduction) + "</p>\n" + to_html(table)));
 }
 
 void write_report(const Results& results, const std::filesystem::path& folder, std::size_t most_bytes) {
@@ -234,7 +228,7 @@ void write_report(const Results& results, const std::filesystem::path& folder, s
   // Bias maps and words about pictures take the small rest.
   const std::size_t rest = html_page(title, before + after).size() + most_bytes / 50;
   const ViewerData data = make_viewer_data(results, folder, most_bytes > rest ? most_bytes - rest : 0);
-  write_text(folder / "report.html", html_page(title, before + viewer_html(data) + after));
+  write_text_atomically(folder / "report.html", html_page(title, before + viewer_html(data) + after));
 }
 
 }  // namespace lumigrove

@@ -11,8 +11,6 @@
 namespace lumigrove {
 namespace {
 
-bool is_number(double value) { return value - value == 0; }
-
 // --- looks ---------------------------------------------------------------------------------------------------------
 
 constexpr int kStyles = 10;
@@ -451,7 +449,10 @@ Plot frame_plot(const Results& results, const std::string& light, FrameValue val
     Series series{results.methods[m].name, static_cast<int>(m), {}};
     for (const int frame : results.frames) {
       const Interval interval = interval_of(frame_values(results, static_cast<int>(m), frame, value, budget));
-      if (interval.count > 0) series.points.push_back(point_of(frame, interval));
+      if (interval.count == 0) continue;
+      series.points.push_back(point_of(frame, interval));
+      double& low = series.points.back().low;
+      if (value != FrameValue::kFlicker && low < 0) low = 0;  // neither error can be below
     }
     if (!series.points.empty()) plot.series.push_back(std::move(series));
   }

@@ -9,13 +9,6 @@
 #include "plot.h"
 
 namespace lumigrove {
-namespace {
-
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  write_file_atomically(file, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-}
-
-}  // namespace
 
 void write_plots(const Results& results, const std::filesystem::path& folder) {
   std::set<std::string> lights;
@@ -27,8 +20,8 @@ void write_plots(const Results& results, const std::filesystem::path& folder) {
     for (const Budget against : kBudgets) {
       std::string name = fmt::format("{}.{}.svg", budget_key(against), light);
       std::replace(name.begin(), name.end(), ' ', '-');
-      write_text(folder / "plots" / ("rmse-" + name), standalone_svg(convergence_plot(results, light, Measure::kRmse, against)));
-      write_text(folder / "plots" / ("relmse-" + name),
+      write_text_atomically(folder / "plots" / ("rmse-" + name), standalone_svg(convergence_plot(results, light, Measure::kRmse, against)));
+      write_text_atomically(folder / "plots" / ("relmse-" + name),
                  standalone_svg(convergence_plot(results, light, Measure::kRelMse, against)));
     }
 }

@@ -684,7 +684,7 @@ function pointAt(event) {
   const inside = x >= 0 && y >= 0 && x < data.width && y < data.height;
   if (inside) change({ cursor: { x, y, keyboard: false } });
 }
-let drag = null, pointer = '';
+let drag = null;
 canvas.addEventListener('pointerdown', event => {
   if (event.button !== 0) return;
   drag = onCanvas(event);
@@ -696,11 +696,8 @@ canvas.addEventListener('pointermove', event => {
     const [x, y] = onCanvas(event);
     if (x !== drag[0] || y !== drag[1]) pan(x - drag[0], y - drag[1]);
     drag = [x, y];
-  } else {
-    // Browsers also report a pointer at rest when the page moves under it.
-    const place = `${event.screenX},${event.screenY}`;
-    if (place !== pointer) pointAt(event);
-    pointer = place;
+  } else if (event.movementX || event.movementY) {  // not when the page moves under a pointer at rest
+    pointAt(event);
   }
 });
 for (const end of ['pointerup', 'pointercancel'])

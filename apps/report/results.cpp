@@ -230,7 +230,7 @@ const char* budget_label(Budget budget) { return budget == Budget::kTime ? "equa
 void write_results(const Results& results, const std::filesystem::path& folder) {
   // File names need not be UTF-8, JSON strings must be.
   const std::string text = to_json(results).dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
-  write_file_atomically(folder / "results.json", {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  write_text_atomically(folder / "results.json", text);
 }
 
 Results read_results(const std::filesystem::path& folder) {

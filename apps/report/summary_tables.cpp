@@ -10,8 +10,6 @@
 namespace lumigrove {
 namespace {
 
-bool is_number(double value) { return value - value == 0; }
-
 bool chosen(const Contender& method, const std::string& light) { return light.empty() || method.light == light; }
 
 Row message_row(const Table& table, const std::string& name, const std::string& message) {

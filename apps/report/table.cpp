@@ -9,8 +9,6 @@
 namespace lumigrove {
 namespace {
 
-bool is_number(double value) { return value - value == 0; }
-
 // Characters of UTF-8.
 int length_of(const std::string& text) {
   return static_cast<int>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
