@@ -49,9 +49,11 @@ std::string metric_notes_html(const Results& results, const std::string& light) 
           "sorts.</p>\n<dl>";
   const Errors own = reference_errors(results, light);
   for (std::size_t m = 0; m < metrics().size(); ++m)
-    text += fmt::format("<div><dt>{}</dt><dd>{}; {} is better; the reference itself: {}</dd></div>\n", metrics()[m].label,
-                        escape_html(metrics()[m].formula), metrics()[m].lower_is_better ? "lower" : "higher",
-                        is_number(own[m]) ? number_text(own[m]) : "unknown");
+    text += fmt::format("<div><dt>{}</dt><dd>{}; {} is better; error of the reference itself: {}{}</dd></div>\n",
+                        metrics()[m].label, escape_html(metrics()[m].formula),
+                        metrics()[m].lower_is_better ? "lower" : "higher",
+                        is_number(own[m]) ? number_text(own[m]) : "unknown",
+                        is_number(own[m]) && !metrics()[m].lower_is_better ? " below 1" : "");
   for (const Reference& reference : results.references)
     if (reference.light == light && reference.frame == results.frames.front())
       text += fmt::format("<div><dt>Reference</dt><dd>{}; {}</dd></div>\n", escape_html(reference.origin),
@@ -64,7 +66,7 @@ std::string estimators_html(const Results& results, const std::string& light) {
   std::string items;
   for (const Contender& method : results.methods)
     if (method.light == light && !method.why.empty())
-      items += fmt::format("<li><b>{}</b> is {}: {}</li>\n", escape_html(method.name), escape_html(method.estimator),
+      items += fmt::format("<li><b>{}</b>, {}: {}</li>\n", escape_html(method.name), escape_html(method.estimator),
                            escape_html(method.why));
   return items.empty() ? "" : "<ul class=\"notes\">\n" + items + "</ul>\n";
 }

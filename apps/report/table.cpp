@@ -91,8 +91,10 @@ std::string cell_html(const Table& table, const Row& row, std::size_t c) {
 
 std::string message_html(const Table& table, const Row& row) {
   const Cell& name = row.cells[table.name_column];
-  return fmt::format("<th scope=\"row\">{}</th><td class=\"message\" colspan=\"{}\">{}</td>", escape_html(name.text),
-                     table.columns.size() - 1, escape_html(row.message));
+  std::string before;
+  for (std::size_t c = 0; c < table.name_column; ++c) before += "<td></td>";
+  return fmt::format("{}<th scope=\"row\">{}</th><td class=\"message\" colspan=\"{}\">{}</td>", before,
+                     escape_html(name.text), table.columns.size() - 1 - table.name_column, escape_html(row.message));
 }
 
 std::string row_html(const Table& table, const Row& row) {

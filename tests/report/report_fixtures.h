@@ -99,7 +99,7 @@ inline void add_run(Results& r, const std::filesystem::path& folder, int method,
 inline void add_reference(Results& r, const std::filesystem::path& folder, int frame) {
   const std::string file = fmt::format("reference-{}.exr", frame);
   write_picture_of(folder / file, kReferenceColor, gain_of(frame, 0));
-  r.references.push_back({"all light", frame, file, "path, 1024 spp in two halves, 61 s", {0.004, 1e-5, 0.99, 0.003}});
+  r.references.push_back({"all light", frame, file, "path, 1024 spp in two halves, 61 s", {0.004, 1e-5, 0.01, 0.003}});
 }
 
 // Everything there.
