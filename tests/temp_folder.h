@@ -20,7 +20,7 @@ class TempFolder {
  public:
   TempFolder() {
     static int counter = 0;
-    path_ = std::filesystem::absolute(testing::TempDir()) /
+    path_ = std::filesystem::absolute(::testing::TempDir()) /
             ("lumigrove_test_" + std::to_string(getpid()) + "_" + std::to_string(counter++));
     std::filesystem::remove_all(path_);  // what a killed run has left
     std::filesystem::create_directories(path_);
