@@ -8,7 +8,7 @@
 namespace lumigrove::bench {
 namespace {
 
-constexpr int kImages = 8;
+constexpr int kCutImages = 8;
 
 std::string value_text(double value) { return fmt::format("{:.2f}", value); }
 
@@ -106,7 +106,7 @@ void report_weights(const Subject& subject, Variant variant, const Report& repor
                                          {with(root, "Yuksel's weights", yuksel), 8},
                                          {cut, 8},
                                          {with(cut, "Yuksel's weights, cuts", yuksel), 8}},
-                                        kImages);
+                                        kCutImages);
   const PairReport pair{12, subject, variant, report};
   pair.mse("8 spp, from the root: MSE min-max / Yuksel's weights", "below 1", all[0], all[1], {}, 1);
   pair.mse("8 spp, cuts: MSE min-max / Yuksel's weights", "below 1", all[2], all[3], {}, 1);
@@ -126,7 +126,7 @@ void report_two_levels(const Subject& subject, Variant variant, bool sparse, con
                                                    {named(perfect_cut(variant, false), false), 8},
                                                    {named(perfect_root(variant, true), true), 8},
                                                    {named(perfect_root(variant, false), false), 8}},
-                                                  kImages);
+                                                  kCutImages);
   const PairReport pair{12, subject, variant, report};
   const World& world = study.world(subject_settings(subject, perfect_root(variant, true), 8));
   const std::string parts =
@@ -153,7 +153,7 @@ void report_interleaving(const Subject& subject, Variant variant, const Report& 
       SubjectStudy::of(subject).measure({{with(cut, "plain", {}), 8},
                                          {with(cut, "interleaved, nodes", {{"cut_interleave", "2"}}), 32},
                                          {with(cut, "plain", {}), 32}},
-                                        kImages);
+                                        kCutImages);
   const Measured &eight = all[0], &interleaved = all[1], &many = all[2];
   const PairReport pair{13, subject, variant, report};
   const std::string blocks = eight.ok() && interleaved.ok() && many.ok()

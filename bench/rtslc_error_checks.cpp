@@ -9,7 +9,7 @@
 namespace lumigrove::bench {
 namespace {
 
-constexpr int kImages = 8, kEqualTimeImages = 6;
+constexpr int kErrorImages = 8, kEqualTimeImages = 6;
 constexpr int kSpp = 8;            // of table 3
 constexpr int kEqualTimeSpp = 16;  // of the perfect tree with cuts, where times are equal
 constexpr int kMostCutNodes = 32;
@@ -95,7 +95,7 @@ std::array<Rows, 2> measure_rows(const Subject& subject) {
     const auto methods = methods_of(subject, kVariants[v]);
     for (std::size_t p = 0; p < kPlaces; ++p) entries[kNumbers[v][p]] = {methods[p], kSpp};
   }
-  const std::vector<Measured> at_8 = study.measure(entries, kImages);
+  const std::vector<Measured> at_8 = study.measure(entries, kErrorImages);
   const Measured& reference = at_8[kPerfectCut];
   std::vector<Measured> later = at_8;
   if (reference.ok()) {
@@ -252,7 +252,7 @@ void report_splitting(const Subject& subject, const SplittingTable* published, c
   SubjectStudy& study = SubjectStudy::of(subject);
   std::vector<Entry> entries = {{ats(false), kSpp}, {ats(true), 1}};
   for (const Variant variant : kVariants) entries.push_back({perfect_cut(variant, false), kSpp});
-  const std::vector<Measured> all = study.measure(entries, kImages);
+  const std::vector<Measured> all = study.measure(entries, kErrorImages);
   const Measured &saoh = all[0], &split = all[1];
   for (std::size_t v = 0; v < 2; ++v) {
     const Measured& ours = all[2 + v];

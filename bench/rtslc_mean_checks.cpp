@@ -8,7 +8,7 @@
 namespace lumigrove::bench {
 namespace {
 
-constexpr int kTileSize = 8;  // 1024 surfaces: the sum over all lights is taken at each
+constexpr int kMeanTileSize = 8;  // 1024 surfaces: the sum over all lights is taken at each
 constexpr int kSumImages = 8;
 constexpr int kBatches = 64;
 constexpr double kWorstZ = 4.5;  // of some thousand
@@ -46,16 +46,16 @@ std::vector<Estimator> estimators() {
 
 // Means of luminance of the squares, and of all of them.
 std::vector<double> means_of(const RgbImage& light) {
-  const std::size_t values = 3 * kTileSize * kTileSize, tiles = light.rgb.size() / values;
+  const std::size_t values = 3 * kMeanTileSize * kMeanTileSize, tiles = light.rgb.size() / values;
   std::vector<double> means(tiles + 1);
   for (std::size_t i = 0; i < light.rgb.size(); i += 3)
     means[i / values] +=
         static_cast<double>(luminance(vec3(light.rgb[i], light.rgb[i + 1], light.rgb[i + 2])));
   for (std::size_t t = 0; t < tiles; ++t) {
     means[tiles] += means[t] / static_cast<double>(tiles);
-    means[t] /= kTileSize * kTileSize;
+    means[t] /= kMeanTileSize * kMeanTileSize;
   }
-  means[tiles] /= kTileSize * kTileSize;
+  means[tiles] /= kMeanTileSize * kMeanTileSize;
   return means;
 }
 
@@ -93,7 +93,7 @@ std::vector<Estimate> sum_over_lights(SubjectStudy& study, const Subject& subjec
 }
 
 void report_means(const Subject& subject, const Report& report) {
-  SubjectStudy study(subject, true, kTileSize);
+  SubjectStudy study(subject, true, kMeanTileSize);
   const std::vector<Estimate> exact = sum_over_lights(study, subject);
   for (const Estimator& estimator : estimators()) {
     const std::string what = "worst |z| of 17 means: " + estimator.method.name;

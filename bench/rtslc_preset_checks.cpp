@@ -9,7 +9,7 @@
 namespace lumigrove::bench {
 namespace {
 
-constexpr int kImages = 24;
+constexpr int kPresetImages = 24;
 // The middle of the image: of whole camera samples.
 constexpr std::array<int, 4> kWindow = {320, 960, 180, 540};
 
@@ -32,7 +32,7 @@ void report_equal_samples(const Subject& subject, const Report& report) {
   const int spp = make_preset("rtslc").direct.spp;
   std::vector<Entry> entries = {{preset_method("tree"), spp}};
   for (const char* preset : kPresets) entries.push_back({preset_method(preset), spp});
-  const std::vector<Measured> all = SubjectStudy::of(subject).measure(entries, kImages);
+  const std::vector<Measured> all = SubjectStudy::of(subject).measure(entries, kPresetImages);
   const Measured& tree = all[0];
   for (std::size_t k = 1; k < all.size(); ++k) {
     const Measured& ours = all[k];

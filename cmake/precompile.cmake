@@ -18,3 +18,12 @@ function(lumigrove_unity target size)
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${size})
   endif()
 endfunction()
+
+# Compiles these files of the target as one; all that are in no such group alone. `group` is only a name. They must not
+# use a name of their anonymous namespaces for two things.
+function(lumigrove_unite target group)
+  if(LUMIGROVE_UNITY AND launched_by_ccache EQUAL -1)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+    set_source_files_properties(${ARGN} PROPERTIES UNITY_GROUP ${group})
+  endif()
+endfunction()

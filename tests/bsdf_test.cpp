@@ -50,38 +50,38 @@ std::vector<Case> cases() {
 }
 
 // Directions on a sphere grid in the frame of the surface; cells of equal solid angle.
-constexpr int kRows = 32, kColumns = 32;
+constexpr int kCellRows = 32, kCellColumns = 32;
 int cell_of(const Frame& frame, vec3 w) {
   const vec3 local = frame.to_local(w);
-  const int row = std::clamp(int((0.5f * local.z + 0.5f) * kRows), 0, kRows - 1);
+  const int row = std::clamp(int((0.5f * local.z + 0.5f) * kCellRows), 0, kCellRows - 1);
   const int column =
-      std::clamp(int((std::atan2(local.y, local.x) / (2 * kPi) + 0.5f) * kColumns), 0, kColumns - 1);
-  return row * kColumns + column;
+      std::clamp(int((std::atan2(local.y, local.x) / (2 * kPi) + 0.5f) * kCellColumns), 0, kCellColumns - 1);
+  return row * kCellColumns + column;
 }
 template <class F>
 double integrate_cell(const Frame& frame, int cell, int sub, const F& f) {
-  const int row = cell / kColumns, column = cell % kColumns;
+  const int row = cell / kCellColumns, column = cell % kCellColumns;
   double sum = 0;
   for (int i = 0; i < sub * sub; ++i) {
-    const float z = 2 * (float(row) + (float(i / sub) + 0.5f) / float(sub)) / kRows - 1;
-    const float phi = 2 * kPi * ((float(column) + (float(i % sub) + 0.5f) / float(sub)) / kColumns - 0.5f);
+    const float z = 2 * (float(row) + (float(i / sub) + 0.5f) / float(sub)) / kCellRows - 1;
+    const float phi = 2 * kPi * ((float(column) + (float(i % sub) + 0.5f) / float(sub)) / kCellColumns - 0.5f);
     const float r = safe_sqrt(1 - z * z);
     sum += f(frame.to_world(vec3(r * std::cos(phi), r * std::sin(phi), z)));
   }
-  return sum / (sub * sub) * 4 * M_PI / (kRows * kColumns);
+  return sum / (sub * sub) * 4 * M_PI / (kCellRows * kCellColumns);
 }
 
 TEST(Bsdf, SamplesFollowTheirPdf) {
   constexpr int kSamples = 60000;
   for (const Case& c : cases()) {
     const Frame frame = make_frame(c.surface.normal);
-    std::vector<double> observed(kRows * kColumns + 1), expected(kRows * kColumns + 1);
+    std::vector<double> observed(kCellRows * kCellColumns + 1), expected(kCellRows * kCellColumns + 1);
     for (int i = 0; i < kSamples; ++i) {
       const BsdfSample s = bsdf_sample(c.surface, vec3(random(i)));
-      observed[s.pdf > 0 ? cell_of(frame, s.wi) : kRows * kColumns] += 1;
+      observed[s.pdf > 0 ? cell_of(frame, s.wi) : kCellRows * kCellColumns] += 1;
     }
     double above = 0;
-    for (int cell = 0; cell < kRows * kColumns; ++cell) {
+    for (int cell = 0; cell < kCellRows * kCellColumns; ++cell) {
       expected[cell] =
           kSamples * integrate_cell(frame, cell, 12, [&](vec3 w) { return bsdf_pdf(c.surface, w); });
       above += expected[cell];
@@ -98,7 +98,7 @@ TEST(Bsdf, PdfOfADiffuseSurfaceIntegratesToOne) {
   const Surface s = make_surface(vec3(0.5f), vec3(0), 1, 0.3f);
   const Frame frame = make_frame(s.normal);
   double sum = 0;
-  for (int cell = 0; cell < kRows * kColumns; ++cell)
+  for (int cell = 0; cell < kCellRows * kCellColumns; ++cell)
     sum += integrate_cell(frame, cell, 8, [&](vec3 w) { return bsdf_pdf(s, w); });
   EXPECT_NEAR(sum, 1, 1e-4);
 }

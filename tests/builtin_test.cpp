@@ -72,7 +72,7 @@ const BuiltinScene& info_of(const std::string& name) {
   throw Error("no scene " + name);
 }
 
-std::string error_of(const std::string& name) {
+std::string error_of_name(const std::string& name) {
   try {
     make_builtin_scene(name);
   } catch (const Error& error) {
@@ -112,8 +112,8 @@ TEST(MeshBuilder, SolidsAreClosedFaceOutwardsAndHaveTheirVolume) {
   }
 }
 
-class EveryBuiltin : public testing::TestWithParam<std::string> {};
-INSTANTIATE_TEST_SUITE_P(Scenes, EveryBuiltin, testing::ValuesIn([] {
+class EveryBuiltin : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Scenes, EveryBuiltin, ::testing::ValuesIn([] {
                            std::vector<std::string> names;
                            for (const BuiltinScene& scene : builtin_scenes()) names.push_back(scene.name);
                            return names;
@@ -303,16 +303,16 @@ TEST(Builtin, NamesAreRecognisedWithAndWithoutParameters) {
 }
 
 TEST(Builtin, BadNamesAndParametersAreRefusedInASentence) {
-  EXPECT_NE(error_of("nightcity").find("night-city"), std::string::npos);
-  EXPECT_NE(error_of("night-city?lamps=3").find("lights, blocks, seed"), std::string::npos);
-  EXPECT_NE(error_of("night-city?lights=many").find("whole number"), std::string::npos);
-  EXPECT_NE(error_of("night-city?lights=30000.5").find("whole number"), std::string::npos);
-  EXPECT_NE(error_of("night-city?lights=-1").find("5000"), std::string::npos);
-  EXPECT_NE(error_of("night-city?seed=1&seed=2").find("twice"), std::string::npos);
-  EXPECT_NE(error_of("single?light=candle").find("triangle, point, spot"), std::string::npos);
+  EXPECT_NE(error_of_name("nightcity").find("night-city"), std::string::npos);
+  EXPECT_NE(error_of_name("night-city?lamps=3").find("lights, blocks, seed"), std::string::npos);
+  EXPECT_NE(error_of_name("night-city?lights=many").find("whole number"), std::string::npos);
+  EXPECT_NE(error_of_name("night-city?lights=30000.5").find("whole number"), std::string::npos);
+  EXPECT_NE(error_of_name("night-city?lights=-1").find("5000"), std::string::npos);
+  EXPECT_NE(error_of_name("night-city?seed=1&seed=2").find("twice"), std::string::npos);
+  EXPECT_NE(error_of_name("single?light=candle").find("triangle, point, spot"), std::string::npos);
   for (const char* name : {"night-city?seed", "night-city?seed=", "night-city?=3", "night-city?&",
                            "fireflies?n=0", "fireflies?n=nan", "fireflies?n=1e99", "single?"})
-    EXPECT_EQ(error_of(name).empty(), std::string(name) == "single?") << name;
+    EXPECT_EQ(error_of_name(name).empty(), std::string(name) == "single?") << name;
 }
 
 }  // namespace

@@ -30,12 +30,12 @@ Settings view_of_lamps() {
   return settings;
 }
 
-struct Frame {
+struct RenderedFrame {
   Image image;
   bool built_meshes;
 };
 
-Frame frame_of(const Scene& scene, const Settings& settings, History* history) {
+RenderedFrame frame_of(const Scene& scene, const Settings& settings, History* history) {
   RenderStats stats;
   Image image = render(scene, settings, &stats, {}, history);
   return {std::move(image), std::any_of(stats.structures.begin(), stats.structures.end(),
@@ -43,9 +43,9 @@ Frame frame_of(const Scene& scene, const Settings& settings, History* history) {
 }
 
 // The frame is the same to the bit as without a history.
-Frame expect_same_picture(const Scene& scene, const Settings& settings, History& history) {
-  Frame with = frame_of(scene, settings, &history);
-  const Frame without = frame_of(scene, settings, nullptr);
+RenderedFrame expect_same_picture(const Scene& scene, const Settings& settings, History& history) {
+  RenderedFrame with = frame_of(scene, settings, &history);
+  const RenderedFrame without = frame_of(scene, settings, nullptr);
   EXPECT_EQ(with.image.layers.size(), without.image.layers.size());
   if (settings.light_scale > 0) {
     EXPECT_GT(*std::max_element(with.image.find("direct")->values.begin(), with.image.find("direct")->values.end()), 0);

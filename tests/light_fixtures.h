@@ -1,6 +1,7 @@
 // Small scenes full of lights, and the light set, tree and alias table over them.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -219,6 +220,11 @@ double walk_p_value(int draws, std::size_t emitters, Stream& random, const Walk&
   expected[emitters] = draws - total;  // dead branches
   if (expected[emitters] < 1e-3 * draws && observed[emitters] == 0) expected[emitters] = 0;
   return chi_square_p_value(observed, expected);
+}
+
+// Irradiance that one light sample stands for, unoccluded.
+inline double sample_value(const LightSample& sample, const Surface& s) {
+  return luminance(sample.weight) * std::max(0.0f, glm::dot(sample.wi, s.normal));
 }
 
 struct NamedScene {

@@ -11,11 +11,6 @@ namespace {
 
 using namespace lumigrove::testing;
 
-// Irradiance that one light sample stands for, unoccluded.
-double sample_value(const LightSample& sample, const Surface& s) {
-  return luminance(sample.weight) * std::max(0.0f, glm::dot(sample.wi, s.normal));
-}
-
 // The exhaustive sum: every light in turn, many points on each.
 RunningMean exhaustive(LightSampler sampler, const Surface& s, int rounds, Stream& random) {
   RunningMean mean;

@@ -19,7 +19,7 @@ using namespace lumigrove::testing;
 struct LeafRange {
   std::uint32_t first, end;
 };
-LeafRange leaves_below(const LightTreeView& tree, Subtree s) {
+LeafRange range_below(const LightTreeView& tree, Subtree s) {
   std::uint64_t span = 1;  // leaves below a child
   for (int level = s.level + 1; level < tree.levels; ++level) span *= static_cast<std::uint64_t>(tree.width);
   const std::uint64_t first = (static_cast<std::uint64_t>(s.node) * static_cast<std::uint64_t>(tree.width) + s.first) * span;
@@ -57,7 +57,7 @@ TEST(LightCut, IsAPartitionOfAllLights) {
             ASSERT_LE(cut.count, size);
             ASSERT_GE(cut.count, 1);
             std::vector<LeafRange> ranges;
-            for (int i = 0; i < cut.count; ++i) ranges.push_back(leaves_below(tree, cut.nodes[i].subtree));
+            for (int i = 0; i < cut.count; ++i) ranges.push_back(range_below(tree, cut.nodes[i].subtree));
             std::sort(ranges.begin(), ranges.end(), [](LeafRange a, LeafRange b) { return a.first < b.first; });
             std::uint32_t next = 0;
             for (const LeafRange& range : ranges) {
@@ -205,7 +205,7 @@ mat4 placed(vec3 at, vec3 axis, vec3 scale) {
 }
 
 // The same room lit by three lamps of many triangles, shown many times: turned, mirrored, stretched.
-Scene room_of_lamps() {
+Scene room_of_shown_lamps() {
   Scene scene = room_of_lights();
   std::erase_if(scene.nodes, [&](const Node& node) {
     return !node.meshes.empty() &&
@@ -291,7 +291,7 @@ TEST(SharedCuts, HaveTheExhaustiveSumAsMean) {
 }
 
 TEST(SharedCuts, OfEveryTreeHaveTheExhaustiveSumAsMean) {
-  const Scene scene = room_of_lamps();
+  const Scene scene = room_of_shown_lamps();
   const Image truth = render(scene, view_of_lights("exhaustive", 64));
   struct Variant {
     Hierarchy hierarchy;
@@ -399,7 +399,7 @@ TEST(SharedCuts, SpreadTheSamplesOverTheLights) {
 }
 
 TEST(SharedCuts, DoNotDependOnThreadsOrCropWindows) {
-  const Scene scene = room_of_lamps();
+  const Scene scene = room_of_shown_lamps();
   Settings settings = view_of_lights("rtslc", 2);
   settings.width = 150;  // more than one tile
   for (const Hierarchy hierarchy : {Hierarchy::kPerfect, Hierarchy::kTwoLevel, Hierarchy::kSaoh}) {

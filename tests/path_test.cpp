@@ -189,10 +189,10 @@ TEST(PathTracer, ConvexShapeInAConstantEnvironmentReflectsItsAlbedo) {
 // --- closed forms
 // --------------------------------------------------------------------------------------------------
 
-constexpr float kRho = 0.6f;
+constexpr float kFloorAlbedo = 0.6f;
 
 void add_floor(SceneBuilder& b) {
-  b.quad(vec3(-20, 0, -20), vec3(0, 0, 40), vec3(40, 0, 0), b.material(vec3(kRho)));
+  b.quad(vec3(-20, 0, -20), vec3(0, 0, 40), vec3(40, 0, 0), b.material(vec3(kFloorAlbedo)));
 }
 Settings floor_view(const std::string& preset) {
   return square_view(preset, 12, vec3(0.3f, 3, 4), vec3(0, 0, 0), 50);
@@ -210,9 +210,9 @@ TEST(PathTracer, EmissiveTriangleOverAPlaneFollowsLambertsFormula) {
     double chi = 0;
     for (int i = 0; i < 144; ++i) {
       const int x = i % 12, y = i / 12;
-      if (pixel(image, "albedo", i).x < 0.5f * kRho) continue;  // the light's black back
+      if (pixel(image, "albedo", i).x < 0.5f * kFloorAlbedo) continue;  // the light's black back
       const double expected =
-          5 * kRho / M_PI * testing::polygon_irradiance(point_on_floor(settings, x, y), vec3(0, 1, 0), light);
+          5 * kFloorAlbedo / M_PI * testing::polygon_irradiance(point_on_floor(settings, x, y), vec3(0, 1, 0), light);
       const double error = std::sqrt(pixel(image, "variance", i).y);
       const double direct = pixel(image, "direct", i).y;
       EXPECT_TRUE(mean_within(direct, error, expected, 4.5, 1e-5)) << preset << " " << x << "," << y;
@@ -223,7 +223,7 @@ TEST(PathTracer, EmissiveTriangleOverAPlaneFollowsLambertsFormula) {
   }
 }
 
-PunctualLight punctual(LightType type, vec3 color) {
+PunctualLight punctual_light(LightType type, vec3 color) {
   PunctualLight light;
   light.type = type;
   light.color = color;
@@ -237,7 +237,7 @@ void expect_floor(const Scene& scene, const Irradiance& irradiance) {
     const Settings settings = floor_view(preset);
     const Image image = render(scene, settings);
     for (int i = 0; i < 144; ++i) {
-      const double expected = kRho / M_PI * irradiance(point_on_floor(settings, i % 12, i / 12));
+      const double expected = kFloorAlbedo / M_PI * irradiance(point_on_floor(settings, i % 12, i / 12));
       EXPECT_NEAR(pixel(image, "direct", i).y, expected, 2e-4 * expected + 1e-6)
           << preset << " " << i % 12 << "," << i / 12;
     }
@@ -248,7 +248,7 @@ TEST(PathTracer, PointLightFollowsTheInverseSquare) {
   const vec3 at(0.5f, 2, -0.3f);
   SceneBuilder b;
   add_floor(b);
-  b.punctual(punctual(LightType::kPoint, vec3(7)), at, vec3(0, -1, 0));
+  b.punctual(punctual_light(LightType::kPoint, vec3(7)), at, vec3(0, -1, 0));
   expect_floor(b.scene, [&](vec3 p) { return 7 * 2 / std::pow(double(glm::length(at - p)), 3); });
 }
 
@@ -256,7 +256,7 @@ TEST(PathTracer, RangeEndsAPointLight) {
   const vec3 at(0.5f, 2, -0.3f);
   SceneBuilder b;
   add_floor(b);
-  PunctualLight light = punctual(LightType::kPoint, vec3(7));
+  PunctualLight light = punctual_light(LightType::kPoint, vec3(7));
   light.range = 2.5f;
   b.punctual(light, at, vec3(0, -1, 0));
   expect_floor(b.scene, [&](vec3 p) {
@@ -269,7 +269,7 @@ TEST(PathTracer, SpotLightFadesBetweenItsCones) {
   const vec3 at(0, 3, 0), axis = glm::normalize(vec3(0.2f, -1, 0.1f));
   SceneBuilder b;
   add_floor(b);
-  PunctualLight light = punctual(LightType::kSpot, vec3(7));
+  PunctualLight light = punctual_light(LightType::kSpot, vec3(7));
   light.inner_cone = 0.2f;
   light.outer_cone = 0.5f;
   b.punctual(light, at, axis);
@@ -289,7 +289,7 @@ TEST(PathTracer, DirectionalLightIsTheSameEverywhere) {
   const vec3 direction = glm::normalize(vec3(0.4f, -1, 0.3f));
   SceneBuilder b;
   add_floor(b);
-  b.punctual(punctual(LightType::kDirectional, vec3(2)), vec3(0), direction);
+  b.punctual(punctual_light(LightType::kDirectional, vec3(2)), vec3(0), direction);
   expect_floor(b.scene, [&](vec3) { return 2 * -direction.y; });
 }
 
@@ -301,14 +301,14 @@ TEST(PathTracer, OneBounceMatchesQuadrature) {
   SceneBuilder b;
   add_floor(b);
   b.quad(vec3(-1, kHeight, -1), vec3(2, 0, 0), vec3(0, 0, 2), b.material(vec3(0.8f)));
-  b.punctual(punctual(LightType::kPoint, vec3(5)), vec3(light), vec3(0, -1, 0));
+  b.punctual(punctual_light(LightType::kPoint, vec3(5)), vec3(light), vec3(0, -1, 0));
   Settings settings = floor_view("path");
   settings.spp = 200;
   settings.indirect.max_bounces = 1;
   const Image image = render(b.scene, settings);
   int compared = 0;
   for (int i = 0; i < 144; ++i) {
-    if (pixel(image, "albedo", i).x > kRho + 0.01f) continue;  // the panel's back
+    if (pixel(image, "albedo", i).x > kFloorAlbedo + 0.01f) continue;  // the panel's back
     const glm::dvec3 x = point_on_floor(settings, i % 12, i / 12);
     if (glm::length(x) > 2.5) continue;  // too few paths meet the panel for a mean to be normal
     ++compared;
@@ -320,7 +320,7 @@ TEST(PathTracer, OneBounceMatchesQuadrature) {
       const double radiance = kPanel / M_PI * 5 * (kHeight - light.y) / std::pow(to_light, 3);
       sum += radiance * kHeight * kHeight / std::pow(down, 4) * 4 / (kGrid * kGrid);
     }
-    const double expected = kRho / M_PI * sum, error = std::sqrt(pixel(image, "variance", i).y);
+    const double expected = kFloorAlbedo / M_PI * sum, error = std::sqrt(pixel(image, "variance", i).y);
     EXPECT_TRUE(mean_within(pixel(image, "indirect", i).y, error, expected, 4.5, 2e-3 * expected))
         << i % 12 << "," << i / 12;
   }

@@ -17,7 +17,7 @@ using testing::RunningMean;
 constexpr int kSamples = 40000;
 constexpr double kSignificance = 1e-3;
 
-vec4 random(int i) { return Rng{7, 0, static_cast<std::uint32_t>(i)}.uniform4(0); }
+vec4 random_of(int i) { return Rng{7, 0, static_cast<std::uint32_t>(i)}.uniform4(0); }
 
 // p-value of directions against a density, on a grid of equal solid angles; the density is integrated over
 // each cell.
@@ -25,7 +25,7 @@ double direction_p_value(const std::function<vec3(vec2)>& sample, const std::fun
   constexpr int kRows = 16, kColumns = 16, kSub = 64;
   std::vector<double> observed(kRows * kColumns), expected(kRows * kColumns);
   for (int i = 0; i < kSamples; ++i) {
-    const vec4 u = random(i);
+    const vec4 u = random_of(i);
     const vec3 w = sample(vec2(u.x, u.y));
     const double phi = std::atan2(w.y, w.x) / (2 * M_PI) + 0.5;
     const int row = std::min(kRows - 1, static_cast<int>((0.5 * w.z + 0.5) * kRows));
@@ -83,7 +83,7 @@ TEST(Sampling, ThinConeKeepsItsPrecision) {
   const double max_sine = std::sqrt(1 - static_cast<double>(cos_max) * cos_max);
   RunningMean squared_sine;  // uniform in [0, max_sine^2] up to the fourth power of the angle
   for (int i = 0; i < kSamples; ++i) {
-    const vec4 u = random(i);
+    const vec4 u = random_of(i);
     const vec3 w = sample_uniform_cone(vec2(u.x, u.y), cos_max);
     const double sine = std::hypot(w.x, w.y);
     EXPECT_LE(sine, max_sine * 1.001);
@@ -94,7 +94,7 @@ TEST(Sampling, ThinConeKeepsItsPrecision) {
 
 TEST(Sampling, DirectionsAreUnit) {
   for (int i = 0; i < 1000; ++i) {
-    const vec4 u = random(i);
+    const vec4 u = random_of(i);
     for (const vec2 v : {vec2(u.x, u.y), vec2(0, u.y), vec2(1 - 0x1p-24f, u.y)}) {
       EXPECT_NEAR(glm::length(sample_cosine_hemisphere(v)), 1, 1e-6);
       EXPECT_NEAR(glm::length(sample_uniform_sphere(v)), 1, 1e-6);
@@ -107,7 +107,7 @@ TEST(Sampling, DiscIsUniformByArea) {
   constexpr int kGrid = 16;  // polar cells of equal area
   std::vector<double> observed(kGrid * kGrid), expected(kGrid * kGrid, kSamples / double(kGrid * kGrid));
   for (int i = 0; i < kSamples; ++i) {
-    const vec4 u = random(i);
+    const vec4 u = random_of(i);
     const vec2 d = sample_disc(vec2(u.x, u.y));
     const double r2 = glm::dot(d, d), phi = std::atan2(d.y, d.x) / (2 * M_PI) + 0.5;
     ASSERT_LE(r2, 1.000001);
@@ -121,7 +121,7 @@ TEST(Sampling, TriangleIsUniformByArea) {
   constexpr int kGrid = 20;  // squares of the unit triangle; diagonal cells count half
   std::vector<double> observed(kGrid * kGrid), expected(kGrid * kGrid);
   for (int i = 0; i < kSamples; ++i) {
-    const vec4 u = random(i);
+    const vec4 u = random_of(i);
     const vec2 b = sample_uniform_triangle(vec2(u.x, u.y));
     ASSERT_GE(b.x, 0);
     ASSERT_GE(b.y, 0);

@@ -331,10 +331,6 @@ TEST(TreeCuts, ContributionImpliesProbability) {
   }
 }
 
-double sample_value(const LightSample& sample, const Surface& s) {
-  return luminance(sample.weight) * std::max(0.0f, glm::dot(sample.wi, s.normal));
-}
-
 TEST(TreeCuts, TheSumOverTheNodesHasTheExhaustiveSumAsMean) {
   constexpr int kDraws = 1500, kRounds = 60;
   for (const auto& [name, world] : cut_worlds()) {

@@ -14,7 +14,7 @@ namespace {
 
 using namespace lumigrove::testing;
 
-constexpr LightTree::Options kTrees[] = {
+constexpr LightTree::Options kTopTrees[] = {
     {2, false, true}, {4, true, true}, {8, true, true}, {16, true, true}, {2, false, true, Weights::kYuksel},
     {16, true, true, Weights::kYuksel}};
 
@@ -32,7 +32,7 @@ TreeSample draw(const LightSampler& sampler, const Surface& s, Stream& random) {
 
 TEST(TwoLevelTree, ProbabilitiesNeverExceedOneAndSumToItInsideTheLights) {
   for (const NamedScene& named : instance_scenes()) {
-    for (const LightTree::Options& options : kTrees) {
+    for (const LightTree::Options& options : kTopTrees) {
       const TwoLevelWorld world(named.scene, options);
       const LightSampler sampler = world.sampler();
       double best = 0;
@@ -51,7 +51,7 @@ TEST(TwoLevelTree, ProbabilitiesNeverExceedOneAndSumToItInsideTheLights) {
 
 TEST(TwoLevelTree, WalkReportsThePdfBitForBit) {
   for (const NamedScene& named : instance_scenes()) {
-    for (const LightTree::Options& options : kTrees) {
+    for (const LightTree::Options& options : kTopTrees) {
       const TwoLevelWorld world(named.scene, options);
       const LightSampler sampler = world.sampler();
       Stream random(77);
@@ -71,7 +71,7 @@ TEST(TwoLevelTree, WalkReportsThePdfBitForBit) {
 TEST(TwoLevelTree, FrequenciesFollowThePdf) {
   constexpr int kDraws = 20000;
   for (const NamedScene& named : instance_scenes()) {
-    for (const LightTree::Options& options : kTrees) {
+    for (const LightTree::Options& options : kTopTrees) {
       const TwoLevelWorld world(named.scene, options);
       const LightSampler sampler = world.sampler();
       const std::size_t n = sampler.lights.emitters.size();
@@ -118,7 +118,7 @@ TEST(TwoLevelTree, ContributionImpliesProbability) {
   for (Node& node : scenes.back().scene.nodes) node.matrix[3] += vec4(3000, 0, -2000, 0);
   for (const NamedScene& named : scenes) {
     const vec3 shift = named.name == std::string("far away") ? vec3(3000, 0, -2000) : vec3(0);
-    for (const LightTree::Options& options : kTrees) {
+    for (const LightTree::Options& options : kTopTrees) {
       const TwoLevelWorld world(named.scene, options);
       const LightSampler sampler = world.sampler();
       Stream random(8);
@@ -134,10 +134,6 @@ TEST(TwoLevelTree, ContributionImpliesProbability) {
       }
     }
   }
-}
-
-double sample_value(const LightSample& sample, const Surface& s) {
-  return luminance(sample.weight) * std::max(0.0f, glm::dot(sample.wi, s.normal));
 }
 
 TEST(TwoLevelTree, MeanIsTheExhaustiveSum) {

@@ -47,7 +47,7 @@ const char* name_of(WalkEnd end) {
 
 Json list(vec3 v) { return Json::array({v.x, v.y, v.z}); }
 
-std::string text_of(vec3 v) { return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x, v.y, v.z); }
+std::string point_text(vec3 v) { return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x, v.y, v.z); }
 
 // --- one pixel, as text ------------------------------------------------------------------------------------
 
@@ -80,7 +80,7 @@ std::string steps_table(const PixelReport& report) {
   return text;
 }
 
-std::string light_text(vec3 light) { return fmt::format("Y {:.5g}  {}", luminance(light), text_of(light)); }
+std::string light_text(vec3 light) { return fmt::format("Y {:.5g}  {}", luminance(light), point_text(light)); }
 
 std::string drawn_text(const PixelReport& report) {
   const ExplainedWalk& walk = report.walk;
@@ -91,7 +91,7 @@ std::string drawn_text(const PixelReport& report) {
                          ? fmt::format("drawn: light {}", drawn.walk.node)
                          : fmt::format("drawn: a point of substitute {} (box {:.4g} m across)", drawn.walk.node,
                                        drawn.walk.box.diagonal());
-  text += fmt::format(" at {}, normal {}\n", text_of(drawn.light.position), text_of(drawn.light.normal));
+  text += fmt::format(" at {}, normal {}\n", point_text(drawn.light.position), point_text(drawn.light.normal));
   text += row("intensity", light_text(drawn.light.intensity * drawn.walk.pdf) + " W/sr");
   text += row("probability", fmt::format("{:.6g} after {} steps", drawn.walk.pdf, drawn.walk.steps));
   text += row("unoccluded", light_text(walk.unoccluded) + (drawn.clamped ? "  (clamped by G_max)" : "") +
@@ -267,9 +267,9 @@ std::string tree_report_json(const TreeReport& report) {
 std::string pixel_report_text(const PixelReport& report) {
   const Surface& surface = report.surface;
   std::string text = fmt::format("pixel {},{}\n", report.x, report.y);
-  text += row("position", text_of(surface.position) + fmt::format(" m, {:.4g} m from the eye", surface.t));
-  text += row("normal", text_of(surface.normal));
-  text += row("albedo", fmt::format("diffuse {}, specular {}", text_of(surface.diffuse), text_of(surface.specular)));
+  text += row("position", point_text(surface.position) + fmt::format(" m, {:.4g} m from the eye", surface.t));
+  text += row("normal", point_text(surface.normal));
+  text += row("albedo", fmt::format("diffuse {}, specular {}", point_text(surface.diffuse), point_text(surface.specular)));
   text += row("roughness", fmt::format("{:.4g}", surface.roughness));
   text += row("lobe", fmt::format("{}; an image lights it here with probability {:.4g} and divides by that",
                                   name_of(report.lobe), report.lobe_probability));
