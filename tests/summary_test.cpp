@@ -104,6 +104,21 @@ TEST(Summary, TimeToEqualErrorFollowsTheSlope) {
   EXPECT_NEAR(rows[1].equal_error.ratio, 4, 0.02);
 }
 
+// Runs reach it with different numbers of samples.
+TEST(Summary, CurvesEndAtTheTimeBudget) {
+  Results results = made_results({1}, 0.001);
+  for (lumigrove::Run& run : results.runs) {
+    run.stages[0].spp = 20 + run.seed;
+    run.stages[0].seconds = 20;
+    run.stages[0].errors[kRmse] = 0.2;
+  }
+  const CurveBand band = curve_bands(results).at(0);
+  ASSERT_EQ(band.points.size(), 6u);
+  EXPECT_EQ(band.points.back().spp, 21);
+  EXPECT_EQ(band.points.back().seconds, 20);
+  EXPECT_NEAR(band.points.back().rmse.mean, 0.2, 1e-12);
+}
+
 TEST(Summary, ACurveThatHasBecomeFlatNeverGetsThere) {
   Results results = made_results({1, 2}, 0.001);
   for (lumigrove::Run& run : results.runs)

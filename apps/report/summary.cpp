@@ -213,6 +213,24 @@ std::vector<PassTime> median_passes(const std::vector<const Run*>& runs) {
   return passes;
 }
 
+// --- curves -------------------------------------------------------------------------------------------------------------
+
+// The time budget, where runs have stopped after different numbers of samples, ends the curve.
+void add_end(const std::vector<const Run*>& runs, CurveBand& band) {
+  Samples spp, seconds, rmse, rel_mse;
+  for (const Run* run : runs) {
+    const Stage& stage = run->stage(Budget::kTime);
+    if (stage.spp == 0) return;
+    spp.add(run->seed, stage.spp);
+    seconds.add(run->seed, stage.seconds);
+    rmse.add(run->seed, stage.errors[kRmse]);
+    rel_mse.add(run->seed, stage.errors[static_cast<std::size_t>(Metric::kRelMse)]);
+  }
+  const double end = seconds.interval().mean;
+  if (band.points.empty() || end > band.points.back().seconds)
+    band.points.push_back({spp.interval().mean, end, rmse.interval(), rel_mse.interval()});
+}
+
 // --- cautions ----------------------------------------------------------------------------------------------------------
 
 void caution_of_reference(const Results& results, const std::string& light, std::vector<std::string>& sentences) {
@@ -325,6 +343,7 @@ std::vector<CurveBand> curve_bands(const Results& results) {
       }
       band.points.push_back({double(spp), seconds.interval().mean, rmse.interval(), rel_mse.interval()});
     }
+    add_end(runs, band);
     if (!band.points.empty()) bands.push_back(std::move(band));
   }
   return bands;

@@ -50,7 +50,8 @@ std::vector<CostRow> costs(const Results& results);
 // The largest of the references' own errors for methods measured on `light`; NaN: unknown.
 Errors reference_errors(const Results& results, const std::string& light);
 
-// Curves of one method: at each sample count that every seed of a frame reached, mean and interval of the values.
+// Curves of one method: at each sample count that every run reached, and at last at the time budget, mean and interval of
+// the values.
 struct CurveBand {
   int method = 0;
   struct Point {
