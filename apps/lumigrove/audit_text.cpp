@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
+
+#include "json_text.h"
 
 namespace lumigrove {
 namespace {
-
-using AuditJson = nlohmann::ordered_json;
 
 std::size_t seen_points(const AuditReport& report) {
   return static_cast<std::size_t>(
@@ -37,10 +36,8 @@ std::string never_found_text(const AuditReport& report) {
   return text + ".\n";
 }
 
-AuditJson list(vec3 v) { return AuditJson::array({v.x, v.y, v.z}); }
-
-AuditJson json_of(const LightName& light) {
-  AuditJson json = {{"kind", light.kind}};
+Json json_of(const LightName& light) {
+  Json json = {{"kind", light.kind}};
   for (const auto& [key, value] : {std::pair<const char*, const std::string&>{"node", light.node},
                                    {"mesh", light.mesh},
                                    {"material", light.material},
@@ -51,18 +48,18 @@ AuditJson json_of(const LightName& light) {
   return json;
 }
 
-AuditJson json_of(const AuditPoint& point) {
-  return {{"position", list(point.surface.position)}, {"normal", list(point.surface.normal)}, {"seen", point.seen}};
+Json json_of(const AuditPoint& point) {
+  return {{"position", json_list(point.surface.position)}, {"normal", json_list(point.surface.normal)}, {"seen", point.seen}};
 }
 
-AuditJson json_of(const AuditReport& report, const WorstTest& test) {
-  AuditJson json = {{"p", test.p}, {"corrected_p", test.corrected}, {"what", test.what}};
-  json["point"] = test.p < 1 && test.point != kNoCell ? json_of(report.points[test.point]) : AuditJson();
+Json json_of(const AuditReport& report, const WorstTest& test) {
+  Json json = {{"p", test.p}, {"corrected_p", test.corrected}, {"what", test.what}};
+  json["point"] = test.p < 1 && test.point != kNoCell ? json_of(report.points[test.point]) : Json();
   return json;
 }
 
-AuditJson json_of(const AuditReport& report, const AuditRow& row, const std::vector<std::string>& methods) {
-  AuditJson missed = AuditJson::array();
+Json json_of(const AuditReport& report, const AuditRow& row, const std::vector<std::string>& methods) {
+  Json missed = Json::array();
   for (const MissedLight& light : row.missed)
     missed.push_back({{"light", json_of(light.name)},
                       {"point", json_of(report.points[light.point])},
@@ -117,7 +114,7 @@ std::string audit_text(const AuditReport& report) {
 }
 
 std::string audit_json(const AuditReport& report) {
-  AuditJson json = {{"scene", report.scene},
+  Json json = {{"scene", report.scene},
                     {"lights", report.emitters},
                     {"points", report.points.size()},
                     {"seen_points", seen_points(report)},
@@ -126,15 +123,15 @@ std::string audit_json(const AuditReport& report) {
                     {"significance", report.options.significance},
                     {"tests", all_tests(report)},
                     {"holds", report.holds()}};
-  json["samplers"] = AuditJson::array();
+  json["samplers"] = Json::array();
   for (std::size_t i = 0; i < report.rows.size(); ++i)
     json["samplers"].push_back(json_of(report, report.rows[i], report.methods[i]));
   json["notes"] = report.notes;
-  AuditJson first = AuditJson::array();
+  Json first = Json::array();
   for (const LightName& light : report.never_found) first.push_back(json_of(light));
   json["never_found"] = {{"count", report.never_found_count}, {"first", first}};
   // Names need not be UTF-8, JSON strings must be.
-  return json.dump(2, ' ', false, AuditJson::error_handler_t::replace) + '\n';
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
 }  // namespace lumigrove

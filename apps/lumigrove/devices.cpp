@@ -12,15 +12,14 @@ namespace {
 
 constexpr const char* kCpu = "cpu";
 
-// Linux; other systems get no name.
+}  // namespace
+
 std::string processor_name() {
   std::ifstream info("/proc/cpuinfo");
   for (std::string line; std::getline(info, line);)
     if (line.starts_with("model name")) return line.substr(std::min(line.find(':') + 2, line.size()));
   return "processor of unknown name";
 }
-
-}  // namespace
 
 std::string device_list() {
   return fmt::format("{}  {}, {} threads\n", kCpu, processor_name(), std::thread::hardware_concurrency());

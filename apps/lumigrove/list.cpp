@@ -2,18 +2,15 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <nlohmann/json.hpp>
-
 #include "commands.h"
 #include "devices.h"
 #include "frame/estimator.h"
+#include "json_text.h"
 #include "lumigrove/scene.h"
 #include "lumigrove/settings.h"
 
 namespace lumigrove {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 std::string estimator_of(const PresetInfo& preset) {
   return estimator_text(estimator_label(make_preset(preset.name)));

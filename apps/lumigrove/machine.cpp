@@ -6,21 +6,11 @@
 #include <unistd.h>
 
 #include <ctime>
-#include <fstream>
 #include <thread>
 
+#include "devices.h"
+
 namespace lumigrove {
-namespace {
-
-std::string processor_name() {
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);)
-    if (line.starts_with("model name") && line.find(": ") != std::string::npos) return line.substr(line.find(": ") + 2);
-  return "unknown processor";
-}
-
-}  // namespace
-
 Machine this_machine(int threads) {
   Machine machine;
   machine.processor = processor_name();

@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
+#include "json_text.h"
 #include "lights/emitter.h"
 #include "lights/light_set.h"
 
@@ -126,14 +125,12 @@ std::string info_text(const SceneInfo& info) {
 }
 
 std::string info_json(const SceneInfo& info) {
-  using Json = nlohmann::ordered_json;
-  const auto list = [](vec3 v) { return Json::array({v.x, v.y, v.z}); };
   Json cameras = Json::array(), emitters = Json::array();
   for (const CameraInstance& c : info.cameras)
     cameras.push_back({{"name", c.camera.name},
-                       {"position", list(c.position)},
-                       {"forward", list(c.forward)},
-                       {"up", list(c.up)},
+                       {"position", json_list(c.position)},
+                       {"forward", json_list(c.forward)},
+                       {"up", json_list(c.up)},
                        {"vertical_fov_degrees", glm::degrees(c.camera.vertical_fov)}});
   for (const EmitterGroup& group : info.emitters)
     emitters.push_back({{"kind", group.kind}, {"count", group.count}, {"flux_w", group.flux}});
@@ -157,7 +154,7 @@ std::string info_json(const SceneInfo& info) {
                {"emitters", emitters},
                {"warnings", info.warnings}};
   json["bounds_m"] =
-      info.bounds.empty() ? Json() : Json{{"lo", list(info.bounds.lo)}, {"hi", list(info.bounds.hi)}};
+      info.bounds.empty() ? Json() : Json{{"lo", json_list(info.bounds.lo)}, {"hi", json_list(info.bounds.hi)}};
   return json.dump(2) + '\n';
 }
 

@@ -4,12 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
+
+#include "json_text.h"
 
 namespace lumigrove {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 double share_of(std::uint64_t part, std::uint64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
@@ -44,8 +43,6 @@ const char* name_of(Lobes lobe) { return lobe == Lobes::kGloss ? "gloss" : "diff
 const char* name_of(WalkEnd end) {
   return end == WalkEnd::kDead ? "dead" : end == WalkEnd::kLeaf ? "light" : "substitute";
 }
-
-Json list(vec3 v) { return Json::array({v.x, v.y, v.z}); }
 
 std::string point_text(vec3 v) { return fmt::format("({:.5g}, {:.5g}, {:.5g})", v.x, v.y, v.z); }
 
@@ -153,13 +150,13 @@ Json drawn_json(const ExplainedWalk& walk) {
   Json json = {{"end", name_of(drawn.walk.end)}};
   if (drawn.walk.end == WalkEnd::kDead) return json;
   json["number"] = drawn.walk.node;
-  json["position"] = list(drawn.light.position);
-  json["normal"] = list(drawn.light.normal);
-  json["intensity"] = list(drawn.light.intensity * drawn.walk.pdf);
+  json["position"] = json_list(drawn.light.position);
+  json["normal"] = json_list(drawn.light.normal);
+  json["intensity"] = json_list(drawn.light.intensity * drawn.walk.pdf);
   json["probability"] = drawn.walk.pdf;
-  json["unoccluded"] = list(walk.unoccluded);
+  json["unoccluded"] = json_list(walk.unoccluded);
   json["occluded"] = walk.occluded;
-  json["contribution"] = list(walk.contribution());
+  json["contribution"] = json_list(walk.contribution());
   json["moved_to_box"] = drawn.boxed;
   json["clamped"] = drawn.clamped;
   if (drawn.walk.end == WalkEnd::kSubstitute) json["diagonal_m"] = drawn.walk.box.diagonal();
@@ -171,7 +168,7 @@ Json samples_json(const SampleSummary& s) {
           {"substitutes", s.substitutes},
           {"dead", s.dead},
           {"occluded", s.occluded},
-          {"mean", list(s.mean)},
+          {"mean", json_list(s.mean)},
           {"mean_y", s.mean_y},
           {"standard_error_y", s.standard_error},
           {"unoccluded_y", s.unoccluded_y},
@@ -291,17 +288,17 @@ std::string pixel_report_json(const PixelReport& report) {
                                                child_json(step.child[1], truth.has_visibility())})}});
   Json json = {{"pixel", Json::array({report.x, report.y})},
                {"surface",
-                {{"position", list(surface.position)},
-                 {"normal", list(surface.normal)},
-                 {"diffuse", list(surface.diffuse)},
-                 {"specular", list(surface.specular)},
+                {{"position", json_list(surface.position)},
+                 {"normal", json_list(surface.normal)},
+                 {"diffuse", json_list(surface.diffuse)},
+                 {"specular", json_list(surface.specular)},
                  {"roughness", surface.roughness}}},
                {"lobe", name_of(report.lobe)},
                {"lobe_probability", report.lobe_probability},
                {"steps", steps},
                {"drawn", drawn_json(report.walk)},
-               {"truth", {{"vpls", truth.unoccluded.size() - 1}, {"unoccluded", list(truth.unoccluded_sum)}}}};
-  if (truth.has_visibility()) json["truth"]["arriving"] = list(truth.visible_sum);
+               {"truth", {{"vpls", truth.unoccluded.size() - 1}, {"unoccluded", json_list(truth.unoccluded_sum)}}}};
+  if (truth.has_visibility()) json["truth"]["arriving"] = json_list(truth.visible_sum);
   if (report.samples) json["samples"] = samples_json(*report.samples);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
