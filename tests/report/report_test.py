@@ -54,7 +54,7 @@ class Page:
     def run(self, script, *arguments):
         return self.browser.execute_script(script, *arguments)
 
-    def until(self, holds, message, seconds=5):
+    def until(self, holds, message, seconds=20):
         end = time.time() + seconds
         while not holds():
             if time.time() > end:
