@@ -223,7 +223,8 @@ class Contest {
     ReferenceImages images;
     for (const auto& [method, lights] : lights_of) {
       const double before = work_done_;
-      const Settings settings = settings_at(job_, scene_, method->settings, frame);
+      Settings settings = settings_at(job_, scene_, method->settings, frame);
+      settings.frame = results_.frames.front();  // the same random numbers: what stands still does not flicker
       images.merge(render_reference(scene_, geometry_, settings, budget, lights, job_.metrics, [&](double seconds) {
         work_done_ = before + std::min(seconds, share * reference_work_);
         tell("reference");
