@@ -5,8 +5,8 @@
 
 #include <cmath>
 #include <cstring>
+#include <random>
 
-#include "base/rng.h"
 #include "lumigrove/scene.h"
 #include "temp_folder.h"
 
@@ -68,14 +68,15 @@ bool loads(const std::filesystem::path& file) {
   return false;
 }
 
-// Replaces one to eight bytes; `text` draws the new ones from characters that parsers care about.
+// Replaces one to eight bytes; `text` draws the new ones from characters that parsers care about. Random numbers are the
+// standard library's: those of base/rng.h, unoptimised here, would be linked into the built-in scenes too.
 std::string mutate(std::string bytes, std::uint32_t seed, bool text) {
   static constexpr char kTelling[] = "0123456789-.eE+/ \n\"{}[],:#";
-  const std::uint32_t count = 1 + pcg4d(uvec4(seed, 0, 0, 0)).x % 8;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const uvec4 random = pcg4d(uvec4(seed, 1 + i, 0, 0));
-    char& byte = bytes[random.x % bytes.size()];
-    byte = text ? kTelling[random.y % (sizeof(kTelling) - 1)] : static_cast<char>(random.y & 0xff);
+  std::mt19937 random(seed);
+  const std::size_t count = 1 + random() % 8;
+  for (std::size_t i = 0; i < count; ++i) {
+    char& byte = bytes[random() % bytes.size()];
+    byte = text ? kTelling[random() % (sizeof(kTelling) - 1)] : static_cast<char>(random() & 0xff);
   }
   return bytes;
 }
