@@ -53,9 +53,12 @@ test: test-dependencies configure
 	$(call CTEST,$(SANITIZE)) --label-regex lumigrove_input_tests
 	$(call CTEST,$(RELEASE))
 
-.PHONY: bench
-bench: configure
+.PHONY: build-bench
+build-bench: configure
 	cmake --build $(RELEASE) --parallel $(JOBS) --target lumigrove_bench
+
+.PHONY: bench
+bench: build-bench
 	$(RELEASE)/bench/lumigrove-bench
 
 .PHONY: sanitize
