@@ -360,9 +360,8 @@ class Contest {
     const std::string& light = results_.methods[static_cast<std::size_t>(entry.method)].light;
     const ReferenceImage& shown = references_.at(light);
     const RgbImage& reference = shown.image;
-    const bool whole = light == kAllLight || light == kDirectLight;
     RgbImage image = with_emission(contestant.image(light), shown.emission);
-    if (whole && shown.emission.rgb.empty()) image = with_emission(image, contestant.part(&FilmPixel::emission));
+    if (shows_emission(light) && shown.emission.rgb.empty()) image = with_emission(image, contestant.part(&FilmPixel::emission));
     image.name = name_of(entry);
     CurvePoint point{contestant.spp(), contestant.seconds(), contestant.rays(), rmse(reference, image),
                      rel_mse(reference, image)};

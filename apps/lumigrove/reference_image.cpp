@@ -46,8 +46,6 @@ Errors errors_of_variance(const Image& image, const RgbImage& beauty) {
   return errors;
 }
 
-bool shows_emission(const std::string& light) { return light == kAllLight || light == kDirectLight; }
-
 // A file from elsewhere has a beauty only, made for this purpose.
 RgbImage light_in_file(const Image& image, const std::string& light, const std::string& file) {
   if (!shows_emission(light)) return rgb_of(image, light, file);
@@ -56,6 +54,8 @@ RgbImage light_in_file(const Image& image, const std::string& light, const std::
 }
 
 }  // namespace
+
+bool shows_emission(const std::string& light) { return light == kAllLight || light == kDirectLight; }
 
 RgbImage with_emission(RgbImage image, const RgbImage& emission) {
   for (std::size_t i = 0; i < emission.rgb.size(); ++i) image.rgb[i] += emission.rgb[i];

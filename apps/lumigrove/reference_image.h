@@ -18,6 +18,8 @@ struct ReferenceImage {
 };
 using ReferenceImages = std::map<std::string, ReferenceImage>;  // by light
 
+// Images of what is measured by this light show emission too; a layer is shown as it is.
+bool shows_emission(const std::string& light);
 // `emission` may be empty.
 RgbImage with_emission(RgbImage image, const RgbImage& emission);
 
